@@ -107,6 +107,20 @@ def test_a_broken_model_is_told_as_the_model(good, tmp_path):
         assert words in refused(tmp_path, json.dumps(changed(good, "model.robot", robot)))
 
 
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (float("nan"), "should be a finite number"),
+        (float("inf"), "should be a finite number"),
+        (1e200, "should be less than 1e+30"),
+        (-1e200, "should be greater than -1e+30"),
+    ],
+)
+def test_a_number_that_is_none_is_called_so(good, tmp_path, value, words):
+    said = refused(tmp_path, json.dumps(changed(good, "parameters.0.value", value)))
+    assert f"(parameters.0.value: {words})" in said or f"input {words}" in said
+
+
 def test_unknown_errors_are_no_damage(tmp_path):
     """What was given and not fitted has no residual: NaN, in the file too (or null)."""
     content = estimate_of_arm().to_dict()

@@ -183,13 +183,19 @@ def test_sets_that_exclude_each_other_are_named(sets, named, solver) -> None:
 @pytest.mark.parametrize(
     ("one", "words"),
     [
-        (Known("m.l9", 1.0), r"no standard parameter 'm.l9'.*m.l0"),
+        (Known("m.l9", 1.0), r"no standard parameter 'm.l9'.*did you mean 'm.l\d'"),
         (Sum({"Fv@elbow": 1.0}, 0.0, 1.0), r"'Fv@elbow'.*Fv@j2"),
         (CentreInBox("hand", [0, 0, 0], [1, 1, 1]), r"no link 'hand'.*l0, l1, l2"),
         (CentreInEllipsoid("hand", [0, 0, 0], [1, 1, 1]), r"no link 'hand'.*l0, l1, l2"),
         (Symmetric("l0", "hand"), r"no link 'hand'.*l0, l1, l2"),
         (Bounds("m.l0", 2.0, 1.0), "lower must not exceed upper"),
-        (TotalMass(float("nan"), 1.0), "hold nothing"),
+        (Known("m.lo", 1.0), r"did you mean 'm.l\d'"),
+        (TotalMass(float("nan"), 1.0), r"total mass: a bound is not a number \(NaN\)"),
+        (Bounds("m.l0", "1", 2.0), "m.l0: a bound is a str. give a number"),  # type: ignore[arg-type]
+        (TotalMass(1.0, None), "total mass: a bound is None"),  # type: ignore[arg-type]
+        (Sum({"m.l0": float("inf")}, 0.0, 1.0), "a weight is not finite"),
+        (Sum({"m.l0": float("nan")}, 0.0, 1.0), "the weight of m.l0 is not a number"),
+        (Vanishing(np.ones((2, 3))), r"irrelevant: rows of 3\d finite numbers"),
         (Known("m.l0", float("inf")), "hold nothing"),
         (Bounds("m.l0", upper=-float("inf")), "hold nothing"),
         (CentreInBox("l0", [1, 0, 0], [0, 1, 1]), "box is empty"),

@@ -35,7 +35,7 @@ class LinkCheck:
     hints : tuple of str
         What may have gone wrong.
     remedy : tuple of Change
-        The smallest change after which every rule holds; empty where nothing is broken or no
+        A small change after which every rule holds; empty where nothing is broken or no
         such change is known.
     """
 
@@ -104,8 +104,9 @@ class LinkCheck:
             lines.append(f"  {TITLES[rule.rule]}: {rule.words}")
         lines += [f"  {hint}" for hint in self.hints]
         if self.remedy:
-            changes = [str(change) for change in self.remedy if change.shows]
-            lines.append("  smallest change that fixes it (moments about the centre of mass):")
+            shown = [change for change in self.remedy if change.shows] or self.remedy
+            changes = [str(change) for change in shown]
+            lines.append("  a change that fixes it (moments about the centre of mass):")
             # Three to a line fit 110 columns.
             lines += [f"    {', '.join(changes[i : i + 3])}" for i in range(0, len(changes), 3)]
         elif not any(rule.rule == "finite" for rule in self.broken) and self.kind == "link":

@@ -1,4 +1,4 @@
-"""The smallest change that makes a broken body possible."""
+"""A small change that makes a broken body possible."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class Change:
     unit: str
 
     def __str__(self) -> str:
-        return f"{self.name} {self.before:.4g} -> {self.after:.4g} {self.unit}"
+        digits = 4 if self.shows else 8
+        return f"{self.name} {self.before:.{digits}g} -> {self.after:.{digits}g} {self.unit}"
 
     @property
     def shows(self) -> bool:
@@ -47,12 +48,13 @@ class Change:
 
 
 def remedy(body: Body) -> tuple[Change, ...]:
-    """Return the smallest change after which a body keeps every rule; none if there is none.
+    """Return a small change after which a body keeps every rule; none if there is none.
 
-    Mass and moments move to the nearest consistent ones (`dynident.nlp.nearest_body`). A centre of
-    mass outside of the geometry moves as little as the spread of mass around it allows; a spread
-    too large for the geometry shrinks along the directions in which it is (for one direction the
-    smallest change in the log-det divergence of second moments).
+    Mass and moments move to the nearest consistent ones (`dynident.nlp.nearest_body`; `refit` weighs
+    otherwise, by what is known of the whole robot). A centre of mass outside of the geometry moves
+    as little as the spread of mass around it allows; a spread too large for the geometry shrinks
+    along the directions in which it is (for one direction the smallest change in the log-det
+    divergence of second moments).
     """
     if not body.readable or body.weightless:
         return ()
@@ -130,13 +132,15 @@ def _numbers(phi: Array) -> Array:
 def _changes(body: Body, phi: Array) -> tuple[Change, ...]:
     before, after = _numbers(body.phi), _numbers(phi)
     sizes = np.maximum(_sizes(before, body.length), _sizes(after, body.length))
-    changed = ~(np.abs(after - before) <= _NEGLIGIBLE * sizes)
+    moved = np.abs(after - before) / np.maximum(sizes, np.finfo(float).tiny)
+    # Of a body that is hardly broken all changes are small, and the largest are told.
+    changed = ~(moved <= min(_NEGLIGIBLE, 0.1 * np.max(moved, initial=0.0)))
     # What the solver leaves of a zero is zero.
     after = np.where(np.abs(after) <= _NEGLIGIBLE * _sizes(after, body.length), 0.0, after)
     return tuple(
         Change(name, float(old), float(new), unit)
-        for name, old, new, unit, moved in zip(NAMES, before, after, _UNITS, changed, strict=True)
-        if moved
+        for name, old, new, unit, told in zip(NAMES, before, after, _UNITS, changed, strict=True)
+        if told
     )
 
 

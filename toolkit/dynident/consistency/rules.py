@@ -173,7 +173,10 @@ def _consistency(body: Body) -> list[RuleMargin]:
     triangle = not replace(found, mass=held, inertia_com_min_eig=held).consistent
     words = _negative_moment(phi, found)
     moments = _principal(phi)
-    largest = f"{moments[2]:.4g} > {moments[0]:.4g} + {moments[1]:.4g} kg m^2"
+    excess = moments[2] - moments[0] - moments[1]
+    digits = 4 if excess > 1e-3 * abs(moments[2]) else 8  # so that the excess can be seen
+    largest = " + ".join(f"{one:.{digits}g}" for one in moments[:2])
+    largest = f"{moments[2]:.{digits}g} > {largest} kg m^2"
     scaling = np.diag([1.0 / body.length] * 3 + [1.0])
     scaled = scaling @ pseudo_inertia(phi) @ scaling / (body.moment / body.length**2)
     return [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -131,8 +131,12 @@ class Vanishing:
     name: str = "irrelevant"
 
     def on(self, space: ParameterSpace) -> tuple[Linear, ...]:
-        none = np.zeros(len(self.rows))
-        return (Linear(self.name, self.rows, none, none),)
+        rows = np.asarray(self.rows, dtype=float)
+        if rows.ndim != 2 or rows.shape[1] != space.size or not np.all(np.isfinite(rows)):
+            what = f"rows of {space.size} finite numbers are needed, one for each parameter"
+            raise FitError(what, self.name, "ParameterSpace.of(model).names says which")
+        none = np.zeros(len(rows))
+        return (Linear(self.name, rows, none, none),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,11 +272,23 @@ def _three(values: ArrayLike, where: str) -> np.ndarray:
 def _combination(
     space: ParameterSpace, name: str, weights: dict[str, float], lower: float, upper: float
 ) -> Linear:
-    if not lower <= upper or lower == np.inf or upper == -np.inf:
-        what = f"the bounds {lower:g} to {upper:g} hold nothing"
+    least, most = (_number(bound, "a bound", name) for bound in (lower, upper))
+    if not least <= most or least == np.inf or most == -np.inf:
+        what = f"the bounds {least:g} to {most:g} hold nothing"
         raise FitError(what, name, "lower must not exceed upper")
     A = np.zeros((1, space.size))
     for parameter, weight in weights.items():
-        A[0, space.index(parameter)] = weight
+        A[0, space.index(parameter)] = _number(weight, f"the weight of {parameter}", name)
+    if not np.all(np.isfinite(A)):
+        raise FitError("a weight is not finite", name, "give finite weights")
     unit = space.units[space.index(next(iter(weights)))] if weights else ""
-    return Linear(name, A, np.array([lower]), np.array([upper]), unit=unit)
+    return Linear(name, A, np.array([least]), np.array([most]), unit=unit)
+
+
+def _number(value: object, what: str, where: str) -> float:
+    if isinstance(value, str | bytes | bool) or not isinstance(value, SupportsFloat):
+        kind = "None" if value is None else f"a {type(value).__name__}"
+        raise FitError(f"{what} is {kind}", where, "give a number")
+    if np.isnan(number := float(value)):
+        raise FitError(f"{what} is not a number (NaN)", where, "give a number")
+    return number

@@ -12,6 +12,8 @@ from dynident.errors import FitError
 from dynident.inertia import PARAMETERS, UNITS, frame_change, reference_body
 from dynident.model import Model
 from dynident.robot import Link, Robot
+from dynident.settings import nearest
+from dynident.words import close_word
 
 _FALLBACK_LENGTH = 0.1  # m, where a robot gives no length at all
 
@@ -99,7 +101,7 @@ class ParameterSpace:
             If there is no such link.
         """
         if name not in self.bodies:
-            raise FitError(f"no link '{name}'", remedy=f"links: {', '.join(self.bodies)}")
+            raise FitError(f"no link '{name}'", remedy=nearest(name, self.bodies, "links"))
         k = self.bodies.index(name)
         return slice(10 * k, 10 * k + 10)
 
@@ -112,7 +114,9 @@ class ParameterSpace:
             If there is no such parameter.
         """
         if name not in self.names:
-            remedy = f"for instance {self.names[0]}, {self.names[-1]}"
+            close = close_word(name, self.names)
+            some = f"for instance {self.names[0]}, {self.names[-1]}"
+            remedy = f"did you mean '{close}'?" if close else some
             raise FitError(f"no standard parameter '{name}'", remedy=remedy)
         return self.names.index(name)
 

@@ -215,6 +215,10 @@ def _first(error: ValidationError) -> tuple[str, str]:
         # pydantic would cite an integer of any length.
         "int_from_float": "should be a whole number",
     }
+    bound = first.get("ctx", {})
+    if first["type"] in ("less_than", "greater_than"):  # in full it would have thirty digits
+        sense = first["type"].replace("_", " ")
+        said[first["type"]] = f"should be {sense} {bound.get('lt', bound.get('gt')):g}"
     message = said.get(first["type"], first["msg"])
     return key, message[:1].lower() + message[1:]
 

@@ -33,10 +33,10 @@ def _reported(value: float) -> float:
 
 
 # A covariance is a square.
-_Square = Annotated[float, Field(gt=-(LARGEST**2), lt=LARGEST**2)]
-_Number = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
-_Size = Annotated[float, Field(ge=0.0, lt=LARGEST)]
-_Positive = Annotated[float, Field(gt=0.0, lt=LARGEST)]
+_Square = Annotated[float, Field(gt=-(LARGEST**2), lt=LARGEST**2, allow_inf_nan=False)]
+_Number = Annotated[float, Field(gt=-LARGEST, lt=LARGEST, allow_inf_nan=False)]
+_Size = Annotated[float, Field(ge=0.0, lt=LARGEST, allow_inf_nan=False)]
+_Positive = Annotated[float, Field(gt=0.0, lt=LARGEST, allow_inf_nan=False)]
 # What nothing is computed from: unknown (NaN, null) where nothing was fitted.
 _Reported = Annotated[
     float,
