@@ -118,7 +118,7 @@ def test_a_broken_model_is_told_as_the_model(good, tmp_path):
 )
 def test_a_number_that_is_none_is_called_so(good, tmp_path, value, words):
     said = refused(tmp_path, json.dumps(changed(good, "parameters.0.value", value)))
-    assert f"(parameters.0.value: {words})" in said or f"input {words}" in said
+    assert "(parameters.0.value: " in said and words in said
 
 
 def test_unknown_errors_are_no_damage(tmp_path):

@@ -50,7 +50,7 @@ class Change:
 def remedy(body: Body) -> tuple[Change, ...]:
     """Return a small change after which a body keeps every rule; none if there is none.
 
-    Mass and moments move to the nearest consistent ones (`dynident.nlp.nearest_body`; `refit` weighs
+    Mass and moments move to the nearest consistent ones (`nlp.nearest_body`; `refit` weighs
     otherwise, by what is known of the whole robot). A centre of mass outside of the geometry moves
     as little as the spread of mass around it allows; a spread too large for the geometry shrinks
     along the directions in which it is (for one direction the smallest change in the log-det
