@@ -140,8 +140,12 @@ def test_explain_prints_what_it_added_and_what_that_is() -> None:
         one = replace(found, steps=(step,), after=replace(after, shapes=shapes))
         (table,) = printed_parameters(one)
         lines = [line.split() for line in str(table).splitlines()]
-        inside = ["T@elbow", "240", *said, "s", "time", "in"]
-        assert inside in [line[: len(inside)] for line in lines]
+        assert ["T@elbow", "240", *said, "s"] in lines
+        legend = [" ".join(line[1:]) for line in lines if line and line[0] in ("Fvt:", "T:")]
+        parts = (*step.effect.parameters(model.robot), *step.effect.shape_parameters(model.robot))
+        assert [one.partition(" ")[0] for one in legend] == [
+            parts[i].means.partition(" ")[0] for i in (0, 2)
+        ]
         names = [line[0] for line in lines if line and "@" in line[0]]
         assert names == ["Fvt@elbow", "Fct@elbow", "T@elbow"]
         # A contact is an event: it has a step, and no part in the model.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -173,27 +173,49 @@ def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
     added = [one.effect.label for one in steps if one.effect.label in estimate.model.slices]
     if not added:
         return ()
-    plain, words = estimate.parameter_table(), _meanings(estimate)
+    stands_for, model = estimate.stands_for, estimate.model
     rows = [
-        (*plain.rows[i][:-1], words[i], plain.rows[i][-1])
+        (
+            model.names[i],
+            *_with_sigma(float(estimate.identified_values[i]), float(estimate.sigma[i])),
+            model.units[i],
+            stands_for[i],
+        )
         for label in added
-        for i in range(estimate.model.size)[estimate.model.slices[label]]
+        for i in range(model.size)[model.slices[label]]
     ]
-    for effect, one, x in _shapes(estimate):
-        if effect.label in added:
-            spread = number(x.sigma, 3), relative(x.value, x.sigma)
-            rows.append(
-                (x.name, number(x.value, 6), *spread, x.unit, _placed(one.means, effect), "")
-            )
-    columns = (*plain.columns[:-1], "what it is", plain.columns[-1])
+    inside = [(e, one, x) for e, one, x in _shapes(estimate) if e.label in added]
+    rows += [(x.name, *_with_sigma(x.value, x.sigma), x.unit, "") for _, _, x in inside]
+    columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")
     if not any(row[-1] for row in rows):
         rows, columns = [row[:-1] for row in rows], columns[:-1]
-    names = {x.name for effect, _, x in _shapes(estimate) if effect.label in added}
-    ends = [said for name, said in shapes_at_ends(estimate.model).items() if name in names]
+    every = shapes_at_ends(model)
+    ends = [every[x.name] for _, _, x in inside if x.name in every]
     elsewhere = "The report (--report) has all parameters of this model."
-    notes = (*plain.notes, *ends, elsewhere)
+    notes = (*_legend(estimate, added), *estimate.parameter_table().notes, *ends, elsewhere)
     table = Table("Parameters of the effects added", columns, tuple(rows), notes)
     return (table,) if widening_after(diagnosis) is None else (_REJECTED, table)
+
+
+def _with_sigma(value: float, sigma: float) -> tuple[str, str, str]:
+    """A value, its standard error and their ratio, in as many digits as the error tells apart."""
+    return number(value, _digits(value, sigma)), number(sigma, 2), relative(value, sigma)
+
+
+def _legend(estimate: Estimate, labels: Collection[str]) -> Iterator[str]:
+    """A line for each symbol of some effects: a table with words in each row would be tall."""
+    model, means = estimate.model, dict[str, dict[str, None]]()
+    for effect in model.effects:
+        if effect.label not in labels:
+            continue
+        linear = effect.parameters(model.robot)
+        names = (*model.names[model.slices[effect.label]], *model.shape_names[effect.label])
+        every = (*linear, *effect.shape_parameters(model.robot))
+        for name, one in zip(names, every, strict=True):
+            words = one.means or effect.name.replace("_", " ")
+            means.setdefault(name.partition("@")[0], {})[words] = None
+    for symbol, words in means.items():
+        yield f"{symbol}: {'; or '.join(words)}"
 
 
 def _interval(value: float, half: float) -> str:
