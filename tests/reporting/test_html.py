@@ -20,6 +20,7 @@ from dynident.reporting import report
 from dynident.reporting.headline import headline
 from dynident.reporting.html import page
 from dynident.reporting.intervals import parameter_table
+from dynident.reporting.next_steps import THIS_REPORT, next_steps
 from dynident.tables import percent
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import Elements, unpacked
@@ -87,6 +88,13 @@ def test_what_is_left_is_a_sentence_or_two_beside_the_verdict_and_its_table_is_f
     between = html[html.index('<h2 id="left"') : html.index('<h2 id="next"')]
     said, _, folded = between.partition("<details>")
     assert left.sentence in said and "<table>" not in said and "<table>" in folded
+
+
+def test_a_report_does_not_tell_its_reader_to_write_it(found):
+    unexplained = replace(found, verdict="unexplained")
+    assert any(THIS_REPORT in one.commands for one in next_steps(unexplained))
+    html = page(unexplained)
+    assert "Look at the pictures of" in html and "--report report.html" not in html
 
 
 def test_every_link_has_its_place_and_every_place_is_one(html):

@@ -32,7 +32,7 @@ from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
 from dynident.reporting.joint_states import State, joint_errors, opened, states
 from dynident.reporting.loop_page import LoopSection, loop_section
-from dynident.reporting.next_steps import FIRST, next_steps, of_study
+from dynident.reporting.next_steps import FIRST, THIS_REPORT, Advice, next_steps, of_study
 from dynident.reporting.packing import compressed, packed
 from dynident.reporting.pictures import diagnosis_pictures as pictures
 from dynident.reporting.switch_page import switch_section
@@ -166,7 +166,7 @@ def _diagnosis_page(
     )
     place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
-    advice, terms = next_steps(diagnosis), glossary(diagnosis)
+    advice, terms = tuple(map(_read_here, next_steps(diagnosis))), glossary(diagnosis)
     advice = advice if study is None else of_study(advice, study)
     known = diagnosis.noise_source
     parameters = parameter_table(diagnosis.after, widening_after(diagnosis), known)
@@ -242,6 +242,11 @@ def rendered(name: str, **parts: object) -> str:
     parts : what it shows, by the names that it has for them.
     """
     return _template(name).render(**parts)
+
+
+def _read_here(advice: Advice) -> Advice:
+    """The advice to somebody who reads the report."""
+    return replace(advice, commands=tuple(one for one in advice.commands if one != THIS_REPORT))
 
 
 def _template(name: str) -> jinja2.Template:

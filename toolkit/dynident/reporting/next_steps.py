@@ -26,6 +26,8 @@ _LITTLE = 0.25
 """Part of the error, below which its fall is said to leave most of it."""
 _DESIGN = "dynident explain STUDY --design next"
 """Designs the recording that tells all apart that a diagnosis left open."""
+THIS_REPORT = "dynident explain STUDY --report report.html"
+"""Command that writes the report, which its reader has already."""
 FIRST = 3
 """Steps that are shown at once: who reads more has time to unfold them."""
 
@@ -319,7 +321,7 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
         "The shape in the pictures is what is known of it. Rule out the simple causes first: a "
         "wrong unit or scale of a column, a clock that jitters, a filter that cuts too low, a "
         "cable, a hand on the robot.",
-        ("dynident explain STUDY --report report.html",),
+        (THIS_REPORT,),
     )
 
 
