@@ -6,7 +6,7 @@ from scipy import signal
 
 from dynident.errors import RecordingError
 from dynident.recording import lowpass
-from dynident.recording.sections import (
+from dynident.recording.low_pass.sections import (
     butterworth_sections,
     response,
     slowest_pole,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from dynident.recording.zero_phase import zero_phase
+from dynident.recording.low_pass.zero_phase import zero_phase
 
 PADDING = 12
 

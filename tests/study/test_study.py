@@ -11,7 +11,7 @@ import pytest
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
 from dynident.evidence import compare_models
 from dynident.fitting import fit
-from dynident.recording import Recording, default_filter, write
+from dynident.recording import Recording, suited_filter, write
 from dynident.study import Study, load
 from study_files import CONTROLLER, RATE_HZ, STUDY, edited, recording, reordered, write_study
 
@@ -127,7 +127,8 @@ def test_only_robot_and_recordings_are_needed(study):
     assert made.robot.names == ("shoulder", "elbow") and made.model.effects == ()
     (run,) = made.train.recordings
     assert (run.use, run.torque, run.period, run.window) == ("train", "measured", None, None)
-    assert made.train.filter is None and made.train.noise is None and made.controller is None
+    assert made.train.filter == suited_filter(made.train.recordings)
+    assert made.train.noise is None and made.controller is None
     assert not len(made.test)
 
 
@@ -135,7 +136,7 @@ def test_only_robot_and_recordings_are_needed(study):
     ("table", "expected"),
     [
         ("position_cutoff_hz = 30.0", (30.0, 13.5, 37.5)),
-        ("rate_hz = 20.0", (20.0, 7.2, 20.0)),
+        ("rate_hz = 20.0", (40.0, 7.2, 20.0)),
         ("cutoff_hz = 18.0", (36.0, 18.0, None)),
         ('position_cutoff_hz = 30.0\ncutoff_hz = "none"', (30.0, None, None)),
         ('position_cutoff_hz = "none"', (None, None, None)),
@@ -152,7 +153,7 @@ def test_a_filter_asks_of_the_torque_what_the_positions_can_tell(study, table, e
 
 def test_edges_alone_leave_the_filter_as_it_is_by_default(study):
     made = study(f"{STUDY}[filter]\nedge_s = [0.1, 0.1]\n").train
-    usual = default_filter(made.recordings[0].rate_hz)
+    usual = suited_filter(made.recordings)
     assert made.filter == replace(usual, edge_s=(0.1, 0.1))
 
 

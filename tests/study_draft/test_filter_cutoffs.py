@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.recording import Recording, default_filter
+from dynident.recording import Recording, default_filter, suited_filter
 from dynident.study_draft import Decision, draft_study
 from study_files import recording
 from synthetic import ARM
@@ -63,7 +63,7 @@ def test_noise_of_positions_asks_for_lower_cutoffs_which_bring_parameters_back(
 def test_without_such_noise_the_usual_filter_stays(tmp_path: Path) -> None:
     study, decisions = drafted(tmp_path, recording(1).part(ONCE))
     assert "filter" not in {one.subject for one in decisions}
-    assert study.train.filter is None
+    assert study.train.filter == suited_filter(study.train.recordings)
 
 
 def test_what_repeats_tells_its_noise_by_itself(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_what_repeats_tells_its_noise_by_itself(tmp_path: Path) -> None:
     noise = 2e-3 * np.random.default_rng(7).normal(size=one.q.shape)
     study, _ = drafted(tmp_path, one.replace(q=one.q + noise))
     assert study.train.recordings[0].period is not None
-    assert study.train.filter is None
+    assert study.train.filter == suited_filter(study.train.recordings)
 
 
 def test_whoever_is_asked_may_keep_the_usual_filter(tmp_path: Path) -> None:
@@ -79,4 +79,4 @@ def test_whoever_is_asked_may_keep_the_usual_filter(tmp_path: Path) -> None:
         return int(one.subject == "filter")
 
     study, _ = drafted(tmp_path, noisy(2e-3), ask=usual)
-    assert study.train.filter is None
+    assert study.train.filter == suited_filter(study.train.recordings)

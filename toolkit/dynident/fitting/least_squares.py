@@ -27,7 +27,6 @@ from dynident.recording import (
     Recording,
     RowCount,
     count_rows,
-    default_filter,
     rows_in_words,
     uniform,
 )
@@ -183,8 +182,7 @@ def rows_of_recordings(dataset: Dataset) -> RowCount:
     """Count the decimated rows of a dataset that are used, and those that are not."""
     total = RowCount()
     for recording in dataset.recordings:
-        settings = dataset.filter or default_filter(recording.rate_hz)
-        total = total + count_rows(uniform(recording), settings)
+        total = total + count_rows(uniform(recording), dataset.filter)
     return total
 
 
@@ -193,8 +191,7 @@ def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:
     found = []
     for recording in dataset.recordings:
         recording = uniform(recording)
-        settings = dataset.filter or default_filter(recording.rate_hz)
         file, digest = recording.provenance.file, recording.provenance.sha256
-        words = f"{settings.description}; {rows_in_words(recording, settings)}"
+        words = f"{dataset.filter.description}; {rows_in_words(recording, dataset.filter)}"
         found.append(DataSource(recording.name or file, digest, words))
     return tuple(found)

@@ -6,7 +6,8 @@ file with its columns under its own names, `Recording` checks what is read. `rea
 wrench sensor's columns as the torques of six joints that stand still.
 `uniform` puts jittered time stamps on a uniform clock. `differentiate` turns positions into a
 `Motion`, `MotionInParts` as much of it as is asked for; `ParallelFilter` passes regressor columns
-and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
+and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`, which
+`suited_filter` chooses for recordings.
 `usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
 `periods` lays repetitions side by side; `within_limits` brings together angles that were kept
 within a turn; `require_motion` and `require_torque` refuse recordings that show nothing.
@@ -48,6 +49,11 @@ from dynident.recording.plausibility import (
     warn_of_limited_torque,
     warn_of_missing_torque,
 )
+from dynident.recording.position_cutoff import (
+    SpeedGain,
+    suited_filter,
+    suited_position_cutoff,
+)
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
 from dynident.recording.repetition import as_points, turning_round, turns_between
 from dynident.recording.uniform import uniform
@@ -80,6 +86,7 @@ __all__ = [
     "Provenance",
     "Recording",
     "RowCount",
+    "SpeedGain",
     "WrenchColumns",
     "as_points",
     "central_difference",
@@ -107,6 +114,8 @@ __all__ = [
     "rows_in_words",
     "sensed_frames",
     "sound_part",
+    "suited_filter",
+    "suited_position_cutoff",
     "turning_round",
     "turns_between",
     "uniform",

@@ -10,6 +10,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
+from dynident.recording.position_cutoff import suited_filter
 from dynident.recording.recording import Recording
 from dynident.recording.usable_rows import usable
 
@@ -40,7 +41,7 @@ class Dataset:
     ----------
     recordings : in any number; unless the filter keeps the ends, their windows leave out where the
         robot stands still there, and a loop's transient before it repeats, see `usable`.
-    filter : None for `default_filter` at each recording's rate.
+    filter : by default the one that suits the recordings, see `suited_filter`.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -50,12 +51,15 @@ class Dataset:
     """
 
     recordings: tuple[Recording, ...]
-    filter: Filter | None = None
+    filter: Filter = None  # type: ignore[assignment]
     noise: Noise | None = None
 
     def __post_init__(self) -> None:
         recordings = tuple(self.recordings)
-        if self.filter is None or self.filter.ends == "drop":
+        if self.filter is None:
+            suited = suited_filter(recordings) if recordings else Filter()
+            object.__setattr__(self, "filter", suited)
+        if self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
         for recording in self.recordings[1:]:
@@ -74,7 +78,7 @@ class Dataset:
 
 def without_ends(dataset: Dataset) -> Dataset:
     """Return the dataset with a filter that drops the ends, where its own keeps them."""
-    if dataset.filter is None or dataset.filter.ends == "drop":
+    if dataset.filter.ends == "drop":
         return dataset
     return replace(dataset, filter=replace(dataset.filter, ends="drop"))
 

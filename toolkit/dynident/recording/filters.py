@@ -11,8 +11,8 @@ import numpy as np
 
 from dynident.arguments import checked
 from dynident.errors import RecordingError
-from dynident.recording.sections import butterworth_sections, slowest_pole
-from dynident.recording.zero_phase import zero_phase
+from dynident.recording.low_pass.sections import butterworth_sections, slowest_pole
+from dynident.recording.low_pass.zero_phase import zero_phase
 
 FORGOTTEN = 1e-12
 """Share of a disturbance at the end of a part that is left where the part is used."""

@@ -16,7 +16,7 @@ import numpy as np
 from dynident.batch import side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.filters import FORGOTTEN, Filter, butterworth, memory
-from dynident.recording.zero_phase import zero_phase
+from dynident.recording.low_pass.zero_phase import zero_phase
 
 _FEW = 8  # columns, of which it costs more to find the empty ones than to filter them
 _AT_ONCE = 64

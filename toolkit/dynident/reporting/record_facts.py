@@ -15,7 +15,6 @@ from dynident.recording import (
     Recording,
     as_points,
     count_rows,
-    default_filter,
     turning_round,
     uniform,
     unwrapped_notes,
@@ -71,10 +70,7 @@ def record_facts(study: Study) -> tuple[RecordFacts, ...]:
     found = []
     for some in by_record(study):
         one = some[0]
-        rows = [
-            count_rows(uniform(entry), settings or default_filter(entry.rate_hz)).used
-            for entry in some
-        ]
+        rows = [count_rows(uniform(entry), settings).used for entry in some]
         gone = dict.fromkeys(
             f"{stretch.reason} {stretch.start:.4g} to {stretch.stop:.4g} s"
             for entry in some

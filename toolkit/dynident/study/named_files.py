@@ -23,6 +23,7 @@ from dynident.recording import (
     frame_of,
     read,
     sound_part,
+    suited_position_cutoff,
     within_limits,
 )
 from dynident.robot import Robot
@@ -73,12 +74,14 @@ def filter_of(said: FilterEntry, recordings: list[Recording]) -> Filter:
     values = said.model_dump()
     cutoff = said.cutoff_hz if isinstance(said.cutoff_hz, float) else None
     position = said.position_cutoff_hz
+    is_recipe = said.decimation != "pick" or said.ends != "drop"
     if position == "default":
         position = default_position_cutoff(min(one.rate_hz for one in recordings), cutoff)
-    values |= {"position_cutoff_hz": None if position == "none" else position, "cutoff_hz": cutoff}
-    is_recipe = said.decimation != "pick" or said.ends != "drop"
     if said.cutoff_hz == "default" and position != "none" and not is_recipe:
-        values["cutoff_hz"], values["rate_hz"] = default_cutoff(position, said.rate_hz)
+        cutoff, values["rate_hz"] = default_cutoff(position, said.rate_hz)
+    if said.position_cutoff_hz == "default" and not is_recipe:
+        position = suited_position_cutoff(recordings, cutoff)
+    values |= {"position_cutoff_hz": None if position == "none" else position, "cutoff_hz": cutoff}
     return Filter(**values)
 
 

@@ -56,12 +56,14 @@ class RecordingEntry(SettingsTable):
 class FilterEntry(SettingsTable):
     """How positions are differentiated, and columns and torque filtered alike.
 
-    Without this table frequencies follow the sampling rate; see `dynident.recording.Filter`.
+    Without this table frequencies follow the sampling rate, and the encoders; see
+    `dynident.recording.Filter`.
     """
 
     position_cutoff_hz: Rate | Literal["default", "none"] = "default"
     """Zero-phase low-pass of q before it is differentiated; `"none"` for none. By default it
-    follows the sampling rate."""
+    follows the sampling rate, and is two or four times as high where the encoders' noise permits:
+    a low-pass shifts the instant at which dry friction turns round."""
     cutoff_hz: Rate | Literal["default", "none"] = "default"
     """The same low-pass on every column and on the torque; `"none"` for none. By default 0.45 of
     the positions' cut-off, above which these predict no torque; none where positions are not

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from dynident import files
 from dynident.effects import FRICTION_WIDTH
-from dynident.recording import Column, FileLayout, Filter, default_filter
+from dynident.recording import Column, FileLayout, Filter
 from dynident.study import load, load_wrenches
 from dynident.study_draft.decision import Decision
 from dynident.study_draft.drafted_columns import (
@@ -62,6 +62,7 @@ class StudyDraft:
     torque_unit : "N m", or "A" of drives.
     effects : that the model starts with.
     rate_hz : of the slowest recording.
+    usual : the filter of recordings whose study states none.
     gravity : (3) m/s^2, in the base's axes.
     is_mounted_otherwise : whether that is not the description's.
     has_torques : whether the files hold torques or currents of the joints; without them only what
@@ -81,6 +82,7 @@ class StudyDraft:
     torque_unit: Literal["N m", "A"]
     effects: tuple[str, ...]
     rate_hz: float
+    usual: Filter
     gravity: tuple[float, ...]
     is_mounted_otherwise: bool
     has_torques: bool
@@ -188,8 +190,9 @@ class StudyDraft:
 
     def _filter(self) -> str:
         if self.filter is None:
-            one, mark = default_filter(self.rate_hz), "# "
-            said = f"Without this table it is the usual one, at {self.rate_hz:.5g} Hz:"
+            one, mark = self.usual, "# "
+            said = f"Without this table it is what suits samples at {self.rate_hz:.5g} Hz and the"
+            said += " noise of these encoders:"
         else:
             one, mark = self.filter, ""
             (taken,) = (each for each in self.decisions if each.subject == "filter")

@@ -25,6 +25,7 @@ from dynident.recording import (
     frames_in,
     read,
     read_wrench,
+    suited_filter,
     uniform,
     within_limits,
 )
@@ -134,6 +135,7 @@ def draft_study(
         torque_unit=unit,
         effects=effects,
         rate_hz=min(one.rate_hz for one in recordings),
+        usual=suited_filter(recordings),
         gravity=tuple(float(x) for x in reading.robot.gravity),
         is_mounted_otherwise=mounted,
         has_torques=True,
@@ -187,6 +189,7 @@ def _of_sensor(
         torque_unit="N m",
         effects=(),
         rate_hz=min(one.rate_hz for one in recordings),
+        usual=suited_filter(recordings),
         gravity=tuple(float(x) for x in robot.gravity),
         is_mounted_otherwise=False,
         has_torques=False,

@@ -19,7 +19,13 @@ from dynident.effects import effects_of
 from dynident.errors import DynidentWarning, RecordingError
 from dynident.fitting.sampling import sample
 from dynident.model import Model
-from dynident.recording import Dataset, Filter, default_cutoff, default_position_cutoff
+from dynident.recording import (
+    Dataset,
+    Filter,
+    default_cutoff,
+    default_position_cutoff,
+    suited_position_cutoff,
+)
 from dynident.tables import listed, percent
 from dynident.wiring.fault import Fault
 
@@ -45,13 +51,12 @@ def unsuitable_position_filter(
 
     Returns
     -------
-    A fault if it does at some joint; none where the filter is the usual one.
+    A fault if it does at some joint; none where the filter is a usual one.
     """
     stated = dataset.filter
-    if stated is None:
-        return ()
     usual_hz = default_position_cutoff(rate_hz, stated.cutoff_hz)
-    if stated.position_cutoff_hz == usual_hz:
+    suited_hz = suited_position_cutoff(dataset.recordings, stated.cutoff_hz)
+    if stated.position_cutoff_hz in (usual_hz, suited_hz):
         return ()
     usual = replace(stated, position_cutoff_hz=usual_hz)
     try:

@@ -26,7 +26,7 @@ from dynident.model import (
     impossible_joints,
     levels_not_met,
 )
-from dynident.recording import Dataset, default_filter
+from dynident.recording import Dataset
 from dynident.tables import percent
 
 
@@ -136,7 +136,7 @@ def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
     if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
         return ()
     rate = min(one.rate_hz for one in train.recordings)
-    criteria, own = evidence.criteria, train.filter or default_filter(rate)
+    criteria, own = evidence.criteria, train.filter
     found = []
     for share in (criteria.gates.filter_share, criteria.gates.second_filter_share):
         lower = replace(train, filter=own.narrowed(share, rate))

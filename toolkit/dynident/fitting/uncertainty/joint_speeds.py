@@ -12,11 +12,9 @@ from scipy.ndimage import maximum_filter1d
 
 from dynident.fitting.sampling import BLOCK, Sampled
 from dynident.recording import MotionInParts
-from dynident.recording.filters import butterworth
-from dynident.recording.sections import response
+from dynident.recording.position_cutoff import SpeedGain
 from dynident.recording.white_noise import encoder_noise_std
 
-_FREQUENCIES = 4096  # at which a filter's response is taken
 DIGITS = 1e-12
 """Of a position's size, that its low-pass keeps: some joints stand exactly."""
 _RINGING = 0.1
@@ -45,12 +43,9 @@ class JointSpeeds:
         White noise of the encoders, or the digits of the numbers, through the low-pass of the
         positions and the central difference.
         """
-        angle, gain = self._gain
-        rate = self.sampled.recording.rate_hz
-        share = rate * float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
         q = self.sampled.recording.q
         digits = DIGITS * np.abs(q).max(axis=0)
-        return np.maximum(encoder_noise_std(q), digits) * share
+        return np.maximum(encoder_noise_std(q), digits) * self._gain.noise
 
     @cached_property
     def rms(self) -> np.ndarray:
@@ -77,25 +72,14 @@ class JointSpeeds:
 
     @cached_property
     def rounding(self) -> float:
-        """Speed that low-pass and difference make up where a stop begins, over the acceleration, s.
-
-        Of a speed that is zero until it rises steadily they make, where it begins to, that rise
-        times half the mean of |t| over their response.
-        """
-        angle, gain = self._gain
-        inside = np.trapezoid((1.0 - gain / angle) / angle**2, angle)
-        return float(_MARGIN * (inside + 1.0 / np.pi) / (np.pi * self.sampled.recording.rate_hz))
+        """Speed that is made up where a stop begins, over the acceleration there, s."""
+        return _MARGIN * self._gain.rounding
 
     @cached_property
-    def _gain(self) -> tuple[np.ndarray, np.ndarray]:
-        """Angles up to pi, and there the gain from positions to speeds, per sample."""
-        angle = np.linspace(0.0, np.pi, _FREQUENCIES)[1:]
-        gain = np.sin(angle)
+    def _gain(self) -> SpeedGain:
+        """From positions to speeds."""
         cutoff = self.sampled.parallel.filter.position_cutoff_hz
-        if cutoff:
-            rate = self.sampled.recording.rate_hz
-            gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
-        return angle, gain
+        return SpeedGain(self.sampled.recording.rate_hz, cutoff)
 
     def used(self) -> Iterator[np.ndarray]:
         """Yield them (T, n) from the first to the last row that is used, part by part."""

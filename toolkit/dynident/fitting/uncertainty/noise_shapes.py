@@ -13,7 +13,7 @@ import numpy as np
 
 from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
-from dynident.recording.sections import response
+from dynident.recording.low_pass.sections import response
 
 HALVING = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 """Of bands of constant density before the filters, as shares of the passband. They halve towards

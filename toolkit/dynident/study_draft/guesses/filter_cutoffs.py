@@ -22,7 +22,7 @@ from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, combine, factorise
-from dynident.recording import Filter, Recording, default_filter
+from dynident.recording import Filter, Recording, suited_filter
 from dynident.tables import number
 
 _SAMPLES = 60_000
@@ -50,9 +50,8 @@ def suitable_filter(
     recordings : that are to be fitted.
     take : takes a decision: (subject, choices, reason) -> which of them.
     """
-    rate = min(one.rate_hz for one in recordings)
     some = [_begin(one, _SAMPLES // len(recordings)) for one in recordings]
-    usual = chosen = default_filter(rate)
+    usual = chosen = suited_filter(recordings)
     reason = ""
     try:
         found = _factors(model, some, usual)

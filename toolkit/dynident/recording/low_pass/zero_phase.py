@@ -14,7 +14,7 @@ import numpy as np
 
 from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
-from dynident.recording.sections import state_at_rest
+from dynident.recording.low_pass.sections import state_at_rest
 
 _LANES = 4  # columns that are filtered together: wider vectors than the processor has are slow
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
