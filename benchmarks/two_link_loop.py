@@ -36,7 +36,7 @@ PERIOD = 6.0
 KP, KD = np.array([900.0, 250.0]), np.array([60.0, 14.0])
 VISCOUS, COULOMB = np.array([1.5, 0.6]), np.array([2.5, 0.9])
 WIDTH = 0.05
-"""Of tanh(v / width) in the dry friction, rad/s."""
+"""Of tanh(v / width) in the dry friction, rad/s, where none is said."""
 
 _SETTLING = 0.5  # s
 _LENGTH, _G = 0.4, 9.81
@@ -59,6 +59,7 @@ class Lab:
     drag : N m s^2/rad^2, of the elbow, with the square of its speed.
     asymmetry : N m s/rad, half of what the elbow's viscous friction differs between its directions.
     rotor : kg m^2, of the elbow's drive.
+    width : rad/s, over which dry friction reverses.
     seconds : of each recording.
     period : whether the motion repeats with `PERIOD` and the recording says so.
     """
@@ -72,6 +73,7 @@ class Lab:
     drag: float = 0.0
     asymmetry: float = 0.0
     rotor: float = 0.0
+    width: float = WIDTH
     seconds: float = 12.0
     period: bool = False
 
@@ -108,7 +110,15 @@ class Lab:
         """Measured positions and commanded torques, (S, T, 2) each."""
         S, T, _ = q_ref.shape
         loop, found = _loop(T), np.empty((S, T, 4))
-        laws = (self.stribeck, self.offset, self.spring, self.drag, self.asymmetry, self.rotor)
+        laws = (
+            self.stribeck,
+            self.offset,
+            self.spring,
+            self.drag,
+            self.asymmetry,
+            self.rotor,
+            self.width,
+        )
         hidden = np.tile(laws, (T, 1))
         for i in range(S):
             start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / RATE)]
@@ -127,7 +137,7 @@ def _loop(samples: int) -> casadi.Function:
     """
     x, before = casadi.SX.sym("x", 4), casadi.SX.sym("before", 2)
     q_ref, v_ref, noise = (casadi.SX.sym(name, 2) for name in ("q_ref", "v_ref", "noise"))
-    hidden, h = casadi.SX.sym("hidden", 6), 1.0 / RATE
+    hidden, h = casadi.SX.sym("hidden", 7), 1.0 / RATE
     y = x[:2] + noise
     tau = casadi.DM(KP) * (q_ref - y) + casadi.DM(KD) * (v_ref - (y - before) * RATE)
     k1 = _rate(x, tau, hidden)
@@ -143,7 +153,7 @@ def _loop(samples: int) -> casadi.Function:
 def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
     """Derivative of positions and velocities, (4,)."""
     q1, q2, v1, v2 = casadi.vertsplit(x)
-    share, offset, spring, drag, asymmetry, rotor = casadi.vertsplit(hidden)
+    share, offset, spring, drag, asymmetry, rotor, width = casadi.vertsplit(hidden)
     s2, c2 = casadi.sin(q2), casadi.cos(q2)
     across = _LENGTH * (_X2 * c2 - _Y2 * s2)
     slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
@@ -152,7 +162,7 @@ def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
     fore = _G * (_X2 * casadi.cos(q1 + q2) - _Y2 * casadi.sin(q1 + q2))
     upper = _G * ((_X1 + _M2 * _LENGTH) * casadi.cos(q1) - _Y1 * casadi.sin(q1))
     v = x[2:]
-    dry = casadi.tanh(v / WIDTH) * (1.0 + share * casadi.exp(-((v / (4 * WIDTH)) ** 2)))
+    dry = casadi.tanh(v / width) * (1.0 + share * casadi.exp(-((v / (4 * width)) ** 2)))
     left = tau - casadi.DM(VISCOUS) * v - casadi.DM(COULOMB) * dry
     b1 = left[0] - slope * (2 * v1 * v2 + v2**2) - upper - fore
     elbow = offset + spring * q2 + (drag * v2 + asymmetry) * casadi.fabs(v2)
@@ -175,9 +185,9 @@ def controller() -> Controller:
     return Controller(kind="pd", rate_hz=RATE, kp=tuple(KP), kd=tuple(KD))
 
 
-def model() -> Model:
-    """The arm with viscous and dry friction."""
-    bodies = Model(Robot.from_text(ARM), friction_width=WIDTH)
+def model(width: float = WIDTH) -> Model:
+    """The arm with viscous friction, and dry friction that reverses over so many rad/s."""
+    bodies = Model(Robot.from_text(ARM), friction_width=width)
     return bodies + "viscous_friction" + "coulomb_friction"
 
 

@@ -8,8 +8,8 @@ import pytest
 import two_link_loop as lab
 from dynident import IV, Constrained, Regression
 from dynident.fitting import Estimate, LeastSquares, Method, SwappedPeriods, fit, load_estimate
-from dynident.fitting.uncertainty.lack_of_fit import widened
-from dynident.recording import Dataset
+from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
+from dynident.recording import Dataset, Filter
 
 STD = (0.5, 0.2)
 
@@ -49,6 +49,19 @@ def test_a_whole_model_is_not_rejected(seed: int) -> None:
     (one,) = lab.Lab(torque_std=STD, period=True).recordings(range(seed, seed + 1))
     found = fit(lab.model(), one)
     assert not found.headline and "colour" in found.words_of_sigma
+
+
+def test_friction_of_a_whole_model_turns_round_when_the_joint_does_behind_fine_encoders() -> None:
+    """What repetitions have in common behind the low-pass of positions that suits, and the usual."""
+    model, usual = lab.model(0.01), Filter(position_cutoff_hz=40.0, cutoff_hz=18.0, rate_hz=50.0)
+    fine = lab.Lab(torque_std=(0.08, 0.016), position_std=3e-6, width=0.01, period=True)
+    left = np.zeros((2, 2))
+    for one in fine.recordings(range(100, 104)):
+        for i, dataset in enumerate((Dataset((one,)), Dataset((one,), usual))):
+            judged = lack_of_fit(model, dataset, fit(model, dataset).values)
+            assert judged is not None
+            left[i] += judged.systematic**2
+    assert np.all(left[0] < (0.25 * left[1][0], 0.7 * left[1][1]))
 
 
 def test_without_repetition_nothing_is_said() -> None:
