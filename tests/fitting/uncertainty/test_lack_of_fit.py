@@ -52,7 +52,7 @@ def test_a_whole_model_is_not_rejected(seed: int) -> None:
 
 
 def test_friction_of_a_whole_model_turns_round_when_the_joint_does_behind_fine_encoders() -> None:
-    """What repetitions have in common behind the low-pass of positions that suits, and the usual."""
+    """What repetitions have in common, behind the low-pass that suits and behind the usual one."""
     model, usual = lab.model(0.01), Filter(position_cutoff_hz=40.0, cutoff_hz=18.0, rate_hz=50.0)
     fine = lab.Lab(torque_std=(0.08, 0.016), position_std=3e-6, width=0.01, period=True)
     left = np.zeros((2, 2))
