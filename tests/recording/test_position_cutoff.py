@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import dynident as di
 from dynident.recording import (
     Dataset,
     Filter,
@@ -17,7 +16,7 @@ from dynident.recording import (
     suited_position_cutoff,
 )
 
-RATE = 500.0
+RATE = 1000.0
 USUAL = 40.0
 
 
@@ -70,7 +69,8 @@ def test_steps_of_a_coarse_encoder_are_noise_though_it_hardly_ever_steps() -> No
 
 
 def test_a_slow_clock_bounds_it_and_the_noisiest_recording_counts() -> None:
-    assert suited_position_cutoff([moved(0.0, rate=100.0)], 9.0) <= 0.4 * 100.0
+    assert suited_position_cutoff([moved(0.0, rate=100.0)], 9.0) == 20.0
+    assert suited_position_cutoff([moved(0.0, rate=500.0)], 18.0) == 80.0
     together = suited_position_cutoff([moved(0.0), moved(1e-3)], 18.0)
     assert together == USUAL
     standing = moved(0.0).replace(q=np.zeros((len(moved(0.0).t), 2)))
@@ -85,4 +85,11 @@ def test_recordings_of_a_dataset_have_one_filter() -> None:
     assert Dataset((one,)).filter.position_cutoff_hz == 4 * USUAL
     stated = Filter(position_cutoff_hz=30.0)
     assert Dataset((one,), stated).filter == stated
-    assert di.Dataset(()).filter == Filter()
+    assert Dataset(()).filter is None
+
+
+def test_recordings_whose_rates_call_for_different_filters_have_their_own() -> None:
+    slow, fast = moved(0.0, rate=100.0), moved(0.0)
+    dataset = Dataset((slow, fast))
+    assert dataset.filter is None
+    assert [dataset.filter_of(one).position_cutoff_hz for one in (slow, fast)] == [20.0, 160.0]

@@ -136,7 +136,7 @@ def test_only_robot_and_recordings_are_needed(study):
     ("table", "expected"),
     [
         ("position_cutoff_hz = 30.0", (30.0, 13.5, 37.5)),
-        ("rate_hz = 20.0", (40.0, 7.2, 20.0)),
+        ("rate_hz = 20.0", (20.0, 7.2, 20.0)),
         ("cutoff_hz = 18.0", (36.0, 18.0, None)),
         ('position_cutoff_hz = 30.0\ncutoff_hz = "none"', (30.0, None, None)),
         ('position_cutoff_hz = "none"', (None, None, None)),

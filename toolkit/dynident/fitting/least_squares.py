@@ -182,7 +182,7 @@ def rows_of_recordings(dataset: Dataset) -> RowCount:
     """Count the decimated rows of a dataset that are used, and those that are not."""
     total = RowCount()
     for recording in dataset.recordings:
-        total = total + count_rows(uniform(recording), dataset.filter)
+        total = total + count_rows(uniform(recording), dataset.filter_of(recording))
     return total
 
 
@@ -191,7 +191,8 @@ def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:
     found = []
     for recording in dataset.recordings:
         recording = uniform(recording)
+        settings = dataset.filter_of(recording)
         file, digest = recording.provenance.file, recording.provenance.sha256
-        words = f"{dataset.filter.description}; {rows_in_words(recording, dataset.filter)}"
+        words = f"{settings.description}; {rows_in_words(recording, settings)}"
         found.append(DataSource(recording.name or file, digest, words))
     return tuple(found)

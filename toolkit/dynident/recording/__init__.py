@@ -51,6 +51,7 @@ from dynident.recording.plausibility import (
 )
 from dynident.recording.position_cutoff import (
     SpeedGain,
+    common_filter,
     suited_filter,
     suited_position_cutoff,
 )
@@ -91,6 +92,7 @@ __all__ = [
     "as_points",
     "central_difference",
     "choose_factor",
+    "common_filter",
     "count_rows",
     "counted_window",
     "default_cutoff",

@@ -10,7 +10,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
-from dynident.recording.position_cutoff import suited_filter
+from dynident.recording.position_cutoff import common_filter, suited_filter
 from dynident.recording.recording import Recording
 from dynident.recording.usable_rows import usable
 
@@ -41,7 +41,8 @@ class Dataset:
     ----------
     recordings : in any number; unless the filter keeps the ends, their windows leave out where the
         robot stands still there, and a loop's transient before it repeats, see `usable`.
-    filter : by default the one that suits the recordings, see `suited_filter`.
+    filter : by default the one that suits all recordings, see `common_filter`; None where there
+        is none: then each has its own.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -51,15 +52,14 @@ class Dataset:
     """
 
     recordings: tuple[Recording, ...]
-    filter: Filter = None  # type: ignore[assignment]
+    filter: Filter | None = None
     noise: Noise | None = None
 
     def __post_init__(self) -> None:
         recordings = tuple(self.recordings)
         if self.filter is None:
-            suited = suited_filter(recordings) if recordings else Filter()
-            object.__setattr__(self, "filter", suited)
-        if self.filter.ends == "drop":
+            object.__setattr__(self, "filter", common_filter(recordings))
+        if self.filter is None or self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
         for recording in self.recordings[1:]:
@@ -71,6 +71,10 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.recordings)
 
+    def filter_of(self, recording: Recording) -> Filter:
+        """The filter of one of the recordings."""
+        return self.filter or suited_filter((recording,))
+
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""
         return Dataset(self.recordings + other.recordings, self.filter, self.noise)
@@ -78,7 +82,7 @@ class Dataset:
 
 def without_ends(dataset: Dataset) -> Dataset:
     """Return the dataset with a filter that drops the ends, where its own keeps them."""
-    if dataset.filter.ends == "drop":
+    if dataset.filter is None or dataset.filter.ends == "drop":
         return dataset
     return replace(dataset, filter=replace(dataset.filter, ends="drop"))
 

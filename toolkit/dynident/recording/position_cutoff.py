@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dynident.errors import RecordingError
 from dynident.recording.filters import (
     Filter,
     butterworth,
@@ -30,10 +31,12 @@ _FREQUENCIES = 4096  # at which a filter's response is taken
 _WIDER = (1.0, 2.0, 4.0)
 """Cut-offs that are tried, over the usual one. Columns and torque pass a far lower low-pass of
 their own, so that beyond these little is gained."""
-_OF_RATE = 0.4  # of the sampling rate, the highest cut-off
+_OF_RATE = 0.2
+"""Of the sampling rate, the highest cut-off: beyond, differences fall short of derivatives."""
 _JUMP = 0.5
 """Jump of the acceleration where dry friction turns round, of its root mean square: with less the
 noise counts more, which is in every row."""
+_ALIKE = 1.05  # largest over smallest of the rates that recordings are decimated to
 _MOST = 1 << 16  # samples that are looked at, from the middle of a recording
 
 
@@ -96,12 +99,32 @@ def suited_position_cutoff(recordings: Sequence[Recording], cutoff_hz: float | N
     tried = [k * usual for k in _WIDER if k == 1.0 or k * usual <= _OF_RATE * rate]
     if len(tried) == 1:
         return usual
-    errors = np.sum([_errors(one, tried) for one in recordings], axis=0)
+    try:
+        errors = np.sum([_errors(one, tried) for one in recordings], axis=0)
+    except RecordingError:  # which whoever samples the recording will tell, with its place
+        return usual
     return tried[int(np.argmin(errors))]
 
 
+def common_filter(recordings: Sequence[Recording]) -> Filter | None:
+    """Return the one filter for recordings whose study states none.
+
+    Parameters
+    ----------
+    recordings : of one robot.
+
+    Returns
+    -------
+    As of `suited_filter`; None for no recording, or where their rates call for different ones.
+    """
+    usual = [default_filter(one.rate_hz).rate_hz or 0.0 for one in recordings]
+    if not usual or max(usual) > _ALIKE * min(usual):
+        return None
+    return suited_filter(recordings)
+
+
 def suited_filter(recordings: Sequence[Recording]) -> Filter:
-    """Return the filter for recordings whose study states none.
+    """Return the filter that suits recordings.
 
     Parameters
     ----------

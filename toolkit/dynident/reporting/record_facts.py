@@ -66,11 +66,10 @@ class RecordFacts:
 
 def record_facts(study: Study) -> tuple[RecordFacts, ...]:
     """Return the facts of each record that a study uses, in its order."""
-    settings = study.train.filter
     found = []
     for some in by_record(study):
         one = some[0]
-        rows = [count_rows(uniform(entry), settings).used for entry in some]
+        rows = [count_rows(uniform(entry), study.train.filter_of(entry)).used for entry in some]
         gone = dict.fromkeys(
             f"{stretch.reason} {stretch.start:.4g} to {stretch.stop:.4g} s"
             for entry in some

@@ -33,7 +33,7 @@ from dynident.robot import Robot
 from dynident.settings import read_toml
 from dynident.study.adding import study_digest
 from dynident.study.named_files import filter_of, naming, recordings_of, robot_of
-from dynident.study.study_file import FilterEntry, StudyFile
+from dynident.study.study_file import StudyFile
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +132,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         raise StudyError(str(error), f"{path}: effects") from None
     recordings, loads = recordings_of(said, path, robot)
     with naming(path, "filter"):
-        settings = filter_of(said.filter or FilterEntry(), recordings)
+        settings = filter_of(said.filter, recordings)
     with naming(path, "criteria"):
         criteria = Criteria.with_values(said.criteria)
     noise = _noise(said, path, robot)

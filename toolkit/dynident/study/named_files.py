@@ -17,6 +17,7 @@ from dynident.recording import (
     FileLayout,
     Filter,
     Recording,
+    common_filter,
     counted_window,
     default_cutoff,
     default_position_cutoff,
@@ -65,12 +66,15 @@ def robot_of(said: StudyFile, path: Path) -> Robot:
     return robot
 
 
-def filter_of(said: FilterEntry, recordings: list[Recording]) -> Filter:
+def filter_of(said: FilterEntry | None, recordings: list[Recording]) -> Filter | None:
     """Return the filter of a study: what it leaves out is chosen to suit what it states.
 
+    Without a table it is that which suits all recordings, if there is one.
     Only "none" leaves positions unfiltered, or lets columns and torque through where positions are
     filtered; but a recipe that says how ends or decimation are to be treated is followed as it is.
     """
+    if said is None:
+        return common_filter(recordings)
     values = said.model_dump()
     cutoff = said.cutoff_hz if isinstance(said.cutoff_hz, float) else None
     position = said.position_cutoff_hz

@@ -24,7 +24,7 @@ from dynident.study.named_files import (
     naming,
     robot_of,
 )
-from dynident.study.study_file import FilterEntry, StudyFile
+from dynident.study.study_file import StudyFile
 
 _PAYLOAD = "payload"
 
@@ -82,7 +82,7 @@ def load_wrenches(path: str | Path) -> tuple[WrenchProblem, ...]:
                 )
             )
         with naming(path, "filter"):
-            settings = filter_of(said.filter or FilterEntry(), recordings)
+            settings = filter_of(said.filter, recordings)
         used = {one.load for one in recordings}
         some = tuple(load for load in loads if load.name in used)
         problems.append(WrenchProblem(robot, frame, Dataset(tuple(recordings), settings), some))

@@ -120,7 +120,6 @@ def draft_study(
     recordings = _without_gaps(_read(logs, reading))
     held = _is_held(reading, recordings, torque.origin == "command", notes)
     behind_gears = reading.geared or reading.motors is not None or unit == "A"
-    mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     effects = (*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION
     entries = drafted_recordings(logs, recordings, facts, notes.take)
     return StudyDraft(
@@ -137,7 +136,7 @@ def draft_study(
         rate_hz=min(one.rate_hz for one in recordings),
         usual=suited_filter(recordings),
         gravity=tuple(float(x) for x in reading.robot.gravity),
-        is_mounted_otherwise=mounted,
+        is_mounted_otherwise=not np.array_equal(reading.robot.gravity, described.gravity),
         has_torques=True,
         has_reference=recordings[0].q_ref is not None,
         decisions=tuple(notes.decisions),

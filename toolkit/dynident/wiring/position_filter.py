@@ -54,6 +54,8 @@ def unsuitable_position_filter(
     A fault if it does at some joint; none where the filter is a usual one.
     """
     stated = dataset.filter
+    if stated is None:
+        return ()
     usual_hz = default_position_cutoff(rate_hz, stated.cutoff_hz)
     suited_hz = suited_position_cutoff(dataset.recordings, stated.cutoff_hz)
     if stated.position_cutoff_hz in (usual_hz, suited_hz):

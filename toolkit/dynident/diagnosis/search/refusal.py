@@ -135,8 +135,8 @@ def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
     """
     if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
         return ()
-    rate = min(one.rate_hz for one in train.recordings)
-    criteria, own = evidence.criteria, train.filter
+    slowest = min(train.recordings, key=lambda one: one.rate_hz)
+    criteria, own, rate = evidence.criteria, train.filter_of(slowest), slowest.rate_hz
     found = []
     for share in (criteria.gates.filter_share, criteria.gates.second_filter_share):
         lower = replace(train, filter=own.narrowed(share, rate))

@@ -13,6 +13,7 @@ from dynident.recording import (
     MotionInParts,
     Noise,
     Recording,
+    suited_filter,
     uniform,
 )
 from dynident.robot import Robot
@@ -52,9 +53,10 @@ def in_newton_metres(dataset: Dataset, drives: DriveGains, robot: Robot) -> Data
 
 
 def _load_torque(
-    recording: Recording, settings: Filter, phi: np.ndarray, robot: Robot
+    recording: Recording, settings: Filter | None, phi: np.ndarray, robot: Robot
 ) -> np.ndarray:
     """Torque of a body on the last joint at every sample, (T, n) N m or N."""
+    settings = settings or suited_filter((recording,))
     every = replace(settings, ends="keep", edge_s=(0.0, 0.0))
     motion = MotionInParts(recording, every).whole
     theta = np.zeros(10 * robot.n)

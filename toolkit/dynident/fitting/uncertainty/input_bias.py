@@ -160,7 +160,7 @@ def input_bias(
         trembling=whole - noise_alone,
         sigma=sigma,
         position_std=np.sqrt(np.mean(np.square(stds), axis=0)),
-        filtered=dataset.filter.position_cutoff_hz is not None,
+        filtered=dataset.filter_of(dataset.recordings[0]).position_cutoff_hz is not None,
     )
 
 

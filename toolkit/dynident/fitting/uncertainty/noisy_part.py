@@ -96,7 +96,7 @@ class NoisyPart:
         -------
         With the share of the recording that it is.
         """
-        rate, settings = recording.rate_hz, dataset.filter
+        rate, settings = recording.rate_hz, dataset.filter_of(recording)
         cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
         # Without a low-pass the true motion is sought behind one, and noise is added without.
         behind = replace(settings, position_cutoff_hz=cutoff)

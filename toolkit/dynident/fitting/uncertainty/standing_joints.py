@@ -154,7 +154,7 @@ def without_stops(
         If a recording does not suit its filter.
     """
     recordings = dataset.recordings
-    keeps = dataset.filter.ends == "keep"
+    keeps = dataset.filter is not None and dataset.filter.ends == "keep"
     if not recordings or keeps or any(one.stops for one in recordings):
         return dataset
     models = [model] if isinstance(model, Model) else list(model)
