@@ -81,8 +81,8 @@ def test_recordings_of_a_dataset_have_one_filter() -> None:
     one = moved(1e-6)
     dataset = Dataset((one, moved(1e-3)))
     assert dataset.filter == suited_filter(dataset.recordings)
-    assert dataset.filter.position_cutoff_hz == USUAL
-    assert Dataset((one,)).filter.position_cutoff_hz == 4 * USUAL
+    assert {dataset.filter_of(x).position_cutoff_hz for x in dataset.recordings} == {USUAL}
+    assert Dataset((one,)).filter_of(one).position_cutoff_hz == 4 * USUAL
     stated = Filter(position_cutoff_hz=30.0)
     assert Dataset((one,), stated).filter == stated
     assert Dataset(()).filter is None
