@@ -21,7 +21,7 @@ from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.telling.separation import DECIDES
 from dynident.model import Model
-from dynident.recording import Dataset, default_filter
+from dynident.recording import Dataset
 from dynident.robot import Robot
 from synthetic import ARM, arm, synthetic, true_values
 
@@ -46,8 +46,7 @@ EVERY_INSTANT = (
 
 def recorded(model: Model = MODEL) -> Dataset:
     values = true_values(model)
-    made = synthetic(model, values, 1, torque_std=0.05)
-    return Dataset((made,), default_filter(made.rate_hz))
+    return Dataset((synthetic(model, values, 1, torque_std=0.05),))
 
 
 def motions(harmonics: int = 5) -> FourierMotions:

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from dynident.recording import (
-    Dataset,
-    Filter,
     Recording,
     SpeedGain,
     central_difference,
+    common_filter,
     lowpass,
     suited_filter,
     suited_position_cutoff,
@@ -68,28 +67,63 @@ def test_steps_of_a_coarse_encoder_are_noise_though_it_hardly_ever_steps() -> No
     assert suited_position_cutoff([fast], 18.0) == suited_position_cutoff([slow], 18.0) == USUAL
 
 
-def test_a_slow_clock_bounds_it_and_the_noisiest_recording_counts() -> None:
-    assert suited_position_cutoff([moved(0.0, rate=100.0)], 9.0) == 20.0
-    assert suited_position_cutoff([moved(0.0, rate=500.0)], 18.0) == 80.0
-    together = suited_position_cutoff([moved(0.0), moved(1e-3)], 18.0)
-    assert together == USUAL
-    standing = moved(0.0).replace(q=np.zeros((len(moved(0.0).t), 2)))
-    assert suited_position_cutoff([standing], 18.0) == USUAL
+@pytest.mark.parametrize(
+    ("rate", "expected"),
+    [(100.0, 20.0), (250.0, 40.0), (500.0, 80.0), (799.99, 160.0), (5000.0, 160.0)],
+)
+def test_a_slow_clock_bounds_it(rate: float, expected: float) -> None:
+    assert suited_filter([moved(0.0, rate=rate)]).position_cutoff_hz == pytest.approx(expected)
 
 
-def test_recordings_of_a_dataset_have_one_filter() -> None:
+@pytest.mark.parametrize("std", [1e-6, 1e-5, 1e-3])
+@pytest.mark.parametrize("where", [0.0, 0.3, 1e3])
+@pytest.mark.parametrize("dither", [0.0, 1e-7])
+def test_joints_that_stand_choose_nothing(std: float, where: float, dither: float) -> None:
+    one = moved(std)
+    rng = np.random.default_rng(2)
+    still = where + dither * rng.integers(0, 2, size=(one.samples, 5))
+    q = np.hstack([one.q, still])
+    beside = Recording(one.t, q, np.zeros_like(q), tuple("abcdefg"))
+    assert suited_position_cutoff([beside], 18.0) == suited_position_cutoff([one], 18.0)
+
+
+def test_nor_does_the_time_in_which_all_stand() -> None:
     one = moved(1e-6)
-    dataset = Dataset((one, moved(1e-3)))
-    assert dataset.filter == suited_filter(dataset.recordings)
-    assert {dataset.filter_of(x).position_cutoff_hz for x in dataset.recordings} == {USUAL}
-    assert Dataset((one,)).filter_of(one).position_cutoff_hz == 4 * USUAL
-    stated = Filter(position_cutoff_hz=30.0)
-    assert Dataset((one,), stated).filter == stated
-    assert Dataset(()).filter is None
+    count = 20 * one.samples
+    waits = one.q[-1] + 1e-6 * np.random.default_rng(3).normal(size=(count, 2))
+    q = np.concatenate([one.q, waits, one.q])
+    paused = Recording(np.arange(len(q)) / RATE, q, np.zeros_like(q), one.joints)
+    assert suited_position_cutoff([paused], 18.0) == suited_position_cutoff([one], 18.0)
 
 
-def test_recordings_whose_rates_call_for_different_filters_have_their_own() -> None:
-    slow, fast = moved(0.0, rate=100.0), moved(0.0)
-    dataset = Dataset((slow, fast))
-    assert dataset.filter is None
-    assert [dataset.filter_of(one).position_cutoff_hz for one in (slow, fast)] == [20.0, 160.0]
+def test_what_is_outside_of_a_window_does_not_count() -> None:
+    fine, coarse = moved(1e-6), moved(1e-3)
+    q = np.concatenate([coarse.q, fine.q])
+    both = Recording(np.arange(len(q)) / RATE, q, np.zeros_like(q), fine.joints)
+    windows = (None, (0.0, 12.0), (12.0, 24.0))
+    found = [suited_position_cutoff([both.replace(window=one)], 18.0) for one in windows]
+    assert found[1:] == [USUAL, 4 * USUAL] and found[0] < 4 * USUAL
+
+
+@pytest.mark.parametrize("std", [2e-4, 1e-3])
+def test_noise_that_a_drive_has_filtered_is_seen(std: float) -> None:
+    """Behind 100 Hz hardly any is left near half the rate of the samples."""
+    one = moved(0.0)
+    noise = lowpass(std * np.random.default_rng(4).normal(size=one.q.shape), RATE, 100.0)
+    assert suited_position_cutoff([one.replace(q=one.q + noise)], 18.0) == USUAL
+
+
+def test_without_a_low_pass_of_the_torque_the_usual_one_stays() -> None:
+    assert suited_position_cutoff([moved(0.0)], None) == USUAL
+
+
+def test_a_recording_that_is_too_short_to_tell_has_the_usual_one() -> None:
+    for samples in (2, 13, 300):
+        assert suited_position_cutoff([moved(0.0).part(slice(0, samples))], 18.0) == USUAL
+
+
+def test_of_rates_that_call_for_different_filters_none_is_common() -> None:
+    assert common_filter([moved(0.0, rate=100.0), moved(0.0)]) is None
+    for rates in ((1000.0, 400.0), (100.0, 101.0)):
+        every = [moved(0.0, rate=one) for one in rates]
+        assert common_filter(every) == suited_filter(every)

@@ -11,9 +11,11 @@ import pytest
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
 from dynident.evidence import compare_models
 from dynident.fitting import fit
+from dynident.model import Model
 from dynident.recording import Recording, suited_filter, write
 from dynident.study import Study, load
 from study_files import CONTROLLER, RATE_HZ, STUDY, edited, recording, reordered, write_study
+from synthetic import ARM, arm, synthetic, true_values
 
 CONTRACT = """
 robot = "arm.urdf"
@@ -462,3 +464,33 @@ def test_a_study_of_files_without_names_and_time(tmp_path):
     for one, other in zip(before.train.recordings, after.train.recordings, strict=True):
         np.testing.assert_allclose(one.t - one.t[0], other.t, atol=1e-9)
         np.testing.assert_array_equal(one.tau, other.tau)
+
+
+@pytest.mark.parametrize(("of_test", "expected"), [((500.0, 1e-6), 80.0), ((500.0, 1e-3), 40.0)])
+def test_training_and_test_recordings_have_one_filter(tmp_path, of_test, expected):
+    both = _behind_encoders(tmp_path, (500.0, 1e-6), of_test)
+    assert both.train.filter == both.test.filter == suited_filter(_every(both))
+    assert both.train.filter is not None and both.train.filter.position_cutoff_hz == expected
+
+
+def test_recordings_of_very_different_rates_have_each_their_own(tmp_path):
+    both = _behind_encoders(tmp_path, (1000.0, 1e-6), (100.0, 1e-6))
+    assert both.train.filter is None and both.test.filter is None
+    assert len(compare_models({"one": both.model}, both.train, both.test).results) == 1
+
+
+def _every(study):
+    return (*study.train.recordings, *study.test.recordings)
+
+
+def _behind_encoders(folder, *of):
+    """A study of an arm that trains with recordings of a rate and noise, and tests with others."""
+    model = Model(arm()) + "viscous_friction"
+    for use, (rate, std) in zip(("train", "test"), of, strict=True):
+        made = synthetic(model, true_values(model), 1, rate_hz=rate, position_std=std)
+        write(made, folder / f"{use}.csv")
+    (folder / "arm.urdf").write_text(ARM)
+    entries = "".join(f'[[recordings]]\nfile = "{u}.csv"\nuse = "{u}"\n' for u in ("train", "test"))
+    path = folder / "study.toml"
+    path.write_text(f'robot = "arm.urdf"\neffects = ["viscous_friction"]\n{entries}')
+    return load(path)

@@ -9,7 +9,7 @@ import two_link_loop as lab
 from dynident import IV, Constrained, Regression
 from dynident.fitting import Estimate, LeastSquares, Method, SwappedPeriods, fit, load_estimate
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
-from dynident.recording import Dataset, Filter
+from dynident.recording import Dataset, Filter, suited_filter
 
 STD = (0.5, 0.2)
 
@@ -57,7 +57,7 @@ def test_friction_of_a_whole_model_turns_round_when_the_joint_does_behind_fine_e
     fine = lab.Lab(torque_std=(0.08, 0.016), position_std=3e-6, width=0.01, period=True)
     left = np.zeros((2, 2))
     for one in fine.recordings(range(100, 104)):
-        for i, dataset in enumerate((Dataset((one,)), Dataset((one,), usual))):
+        for i, dataset in enumerate(Dataset((one,), f) for f in (suited_filter((one,)), usual)):
             judged = lack_of_fit(model, dataset, fit(model, dataset).values)
             assert judged is not None
             left[i] += judged.systematic**2

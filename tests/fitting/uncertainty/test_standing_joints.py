@@ -60,7 +60,7 @@ def test_the_finest_encoders_show_a_stop_beside_which_the_low_pass_rings(
 
     def seen(stops_below: float) -> list[bool]:
         every = (record(seed, stops_below, position_std=1e-8) for seed in range(3))
-        speeds = [JointSpeeds(sample(one, default_filter(RATE_HZ))) for one in every]
+        speeds = [JointSpeeds(sample(one, None)) for one in every]
         return stands(speeds, DEFAULTS.sticking).tolist()
 
     assert seen(0.01) == [False, True] and seen(0.0) == [False, False]
@@ -87,7 +87,7 @@ def jerky(hz: float, rests: float) -> tuple[Recording, np.ndarray]:
 def test_rows_whose_stop_the_low_pass_of_positions_has_rounded_do_not_count(rests: float) -> None:
     """Where a joint stops with a jerk its filtered speed, and so its friction, has a sign still."""
     recording, v = jerky(0.8, rests)
-    sampled = sample(recording, default_filter(RATE_HZ))
+    sampled = sample(recording, None)
     speeds, first = JointSpeeds(sampled), sampled.source.first
     true = np.sign(np.round(v[first : first + sampled.source.samples], 9))
     errors = true - np.sign(sampled.motion.v[:, ELBOW])

@@ -27,6 +27,7 @@ from dynident.recording import (
     Recording,
     RowCount,
     count_rows,
+    default_filter,
     rows_in_words,
     uniform,
 )
@@ -182,7 +183,8 @@ def rows_of_recordings(dataset: Dataset) -> RowCount:
     """Count the decimated rows of a dataset that are used, and those that are not."""
     total = RowCount()
     for recording in dataset.recordings:
-        total = total + count_rows(uniform(recording), dataset.filter_of(recording))
+        settings = dataset.filter or default_filter(recording.rate_hz)
+        total = total + count_rows(uniform(recording), settings)
     return total
 
 
@@ -191,7 +193,7 @@ def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:
     found = []
     for recording in dataset.recordings:
         recording = uniform(recording)
-        settings = dataset.filter_of(recording)
+        settings = dataset.filter or default_filter(recording.rate_hz)
         file, digest = recording.provenance.file, recording.provenance.sha256
         words = f"{settings.description}; {rows_in_words(recording, settings)}"
         found.append(DataSource(recording.name or file, digest, words))

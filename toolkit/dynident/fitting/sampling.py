@@ -23,7 +23,7 @@ from dynident.recording import (
     MotionInParts,
     ParallelFilter,
     Recording,
-    suited_filter,
+    default_filter,
     uniform,
     usable_rows,
 )
@@ -333,7 +333,7 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
     Parameters
     ----------
     recording : resampled here if its clock is jittered.
-    settings : None for `suited_filter` of the recording.
+    settings : None for `default_filter` at the recording's rate.
 
     Raises
     ------
@@ -341,7 +341,7 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
         If fewer than `LEAST_ROWS` rows are left, or the filter does not suit the recording.
     """
     recording = uniform(recording)
-    settings = settings or suited_filter((recording,))
+    settings = settings or default_filter(recording.rate_hz)
     source = MotionInParts(recording, settings)
     rate = source.rate_hz
     parallel = ParallelFilter(settings, rate, recording.period, recording.where)

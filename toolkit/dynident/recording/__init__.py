@@ -54,6 +54,7 @@ from dynident.recording.position_cutoff import (
     common_filter,
     suited_filter,
     suited_position_cutoff,
+    usual_position_cutoffs,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
 from dynident.recording.repetition import as_points, turning_round, turns_between
@@ -124,6 +125,7 @@ __all__ = [
     "unwrapped_notes",
     "usable",
     "usable_rows",
+    "usual_position_cutoffs",
     "warn_of_limited_torque",
     "warn_of_missing_torque",
     "within",

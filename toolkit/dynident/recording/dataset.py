@@ -10,7 +10,6 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
-from dynident.recording.position_cutoff import common_filter, suited_filter
 from dynident.recording.recording import Recording
 from dynident.recording.usable_rows import usable
 
@@ -41,8 +40,7 @@ class Dataset:
     ----------
     recordings : in any number; unless the filter keeps the ends, their windows leave out where the
         robot stands still there, and a loop's transient before it repeats, see `usable`.
-    filter : by default the one that suits all recordings, see `common_filter`; None where there
-        is none: then each has its own.
+    filter : None for `default_filter` at each recording's rate.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -57,8 +55,6 @@ class Dataset:
 
     def __post_init__(self) -> None:
         recordings = tuple(self.recordings)
-        if self.filter is None:
-            object.__setattr__(self, "filter", common_filter(recordings))
         if self.filter is None or self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
@@ -70,10 +66,6 @@ class Dataset:
 
     def __len__(self) -> int:
         return len(self.recordings)
-
-    def filter_of(self, recording: Recording) -> Filter:
-        """The filter of one of the recordings."""
-        return self.filter or suited_filter((recording,))
 
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""

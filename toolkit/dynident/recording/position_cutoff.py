@@ -31,13 +31,21 @@ _FREQUENCIES = 4096  # at which a filter's response is taken
 _WIDER = (1.0, 2.0, 4.0)
 """Cut-offs that are tried, over the usual one. Columns and torque pass a far lower low-pass of
 their own, so that beyond these little is gained."""
-_OF_RATE = 0.2
-"""Of the sampling rate, the highest cut-off: beyond, differences fall short of derivatives."""
+_OF_RATE = 0.202
+"""Of the sampling rate, the highest cut-off: beyond a fifth, differences fall short of derivatives.
+A hundredth more, for clocks that are rounded."""
 _JUMP = 0.5
 """Jump of the acceleration where dry friction turns round, of its root mean square: with less the
 noise counts more, which is in every row."""
 _ALIKE = 1.05  # largest over smallest of the rates that recordings are decimated to
-_MOST = 1 << 16  # samples that are looked at, from the middle of a recording
+_PARTS, _LENGTH = 16, 4096
+"""Parts of a recording that are looked at, spread over it, and samples of each at most."""
+_LEAST = 400  # samples of a part that is looked at
+_MOVES = 20.0  # range of a joint that moves over the noise of its positions
+_NOISE_RATE = 5.0
+"""Rate down to which noise is looked for, over the usual cut-off."""
+_DIGITS = 1e-12
+"""Of a position's size, that its low-pass keeps."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,20 @@ class SpeedGain:
         return angle, gain
 
 
+def usual_position_cutoffs(rate_hz: float, cutoff_hz: float | None) -> tuple[float, ...]:
+    """Return the cut-offs of the positions' low-pass, in Hz, that one is chosen from.
+
+    Parameters
+    ----------
+    rate_hz : of the samples.
+    cutoff_hz : of columns and torque; without one noise far above the motion stays in every row,
+        and only the lowest is asked for.
+    """
+    usual = default_position_cutoff(rate_hz, cutoff_hz)
+    highest = _OF_RATE * rate_hz if cutoff_hz else usual
+    return usual, *(k * usual for k in _WIDER[1:] if k * usual <= highest)
+
+
 def suited_position_cutoff(recordings: Sequence[Recording], cutoff_hz: float | None) -> float:
     """Return the cut-off of the positions' low-pass, in Hz, that suits recordings.
 
@@ -91,36 +113,35 @@ def suited_position_cutoff(recordings: Sequence[Recording], cutoff_hz: float | N
 
     Returns
     -------
-    That of `default_position_cutoff` at the lowest of their rates, or two or four times as much,
-    whichever lets least noise and made-up speed through, all joints counting alike.
+    Of `usual_position_cutoffs` at the lowest of their rates that which makes the error of speeds
+    smallest, noise and what is made up where friction turns round: in the geometric mean over
+    joints, while they move.
     """
-    rate = min(one.rate_hz for one in recordings)
-    usual = default_position_cutoff(rate, cutoff_hz)
-    tried = [k * usual for k in _WIDER if k == 1.0 or k * usual <= _OF_RATE * rate]
+    tried = usual_position_cutoffs(min(one.rate_hz for one in recordings), cutoff_hz)
     if len(tried) == 1:
-        return usual
+        return tried[0]
     try:
-        errors = np.sum([_errors(one, tried) for one in recordings], axis=0)
+        parts = [part for one in recordings for part in _parts(one)]
+        rates = [one.rate_hz for one in recordings for _ in _parts(one)]
+        errors = [_errors(q, rate, tried) for q, rate in zip(parts, rates, strict=True)]
     except RecordingError:  # which whoever samples the recording will tell, with its place
-        return usual
-    return tried[int(np.argmin(errors))]
+        return tried[0]
+    return tried[int(np.argmin(np.sum(errors, axis=0)))] if errors else tried[0]
 
 
 def common_filter(recordings: Sequence[Recording]) -> Filter | None:
-    """Return the one filter for recordings whose study states none.
+    """Return the one filter for the recordings of a study that states none.
 
     Parameters
     ----------
-    recordings : of one robot.
+    recordings : all of them.
 
     Returns
     -------
-    As of `suited_filter`; None for no recording, or where their rates call for different ones.
+    As of `suited_filter`; None where their rates call for different ones.
     """
     usual = [default_filter(one.rate_hz).rate_hz or 0.0 for one in recordings]
-    if not usual or max(usual) > _ALIKE * min(usual):
-        return None
-    return suited_filter(recordings)
+    return suited_filter(recordings) if max(usual) <= _ALIKE * min(usual) else None
 
 
 def suited_filter(recordings: Sequence[Recording]) -> Filter:
@@ -138,24 +159,42 @@ def suited_filter(recordings: Sequence[Recording]) -> Filter:
     return replace(usual, position_cutoff_hz=suited_position_cutoff(recordings, usual.cutoff_hz))
 
 
-def _errors(recording: Recording, cutoffs: Sequence[float]) -> np.ndarray:
-    """Squared error of speeds behind cut-offs over that behind the first, summed over joints."""
-    rate, q = recording.rate_hz, _middle(recording)
-    noise = np.maximum(encoder_noise_std(q), resolution(q) / np.sqrt(12.0))
-    jump = _JUMP * _rms_acceleration(q, rate, cutoffs[0])
-    gains = [SpeedGain(rate, one) for one in cutoffs]
-    squares = np.array([(noise * one.noise) ** 2 + (jump * one.rounding) ** 2 for one in gains])
-    moves = squares[0] > 0.0
-    return np.sum(squares[:, moves] / squares[0, moves], axis=1)
+def _parts(recording: Recording) -> list[np.ndarray]:
+    """Positions (T, n) in parts of the recording, within its window."""
+    low, high = recording.window or (-np.inf, np.inf)
+    first, after = np.searchsorted(recording.t, [low, high]).tolist()
+    length = min(_LENGTH, after - first)
+    if length < _LEAST:
+        return []
+    begins = np.linspace(first, after - length, min(_PARTS, (after - first) // length))
+    return [recording.q[k : k + length] for k in begins.astype(int).tolist()]
 
 
-def _middle(recording: Recording) -> np.ndarray:
-    start = max(0, (recording.samples - _MOST) // 2)
-    return recording.q[start : start + _MOST]
+def _errors(q: np.ndarray, rate_hz: float, cutoffs: Sequence[float]) -> np.ndarray:
+    """Logarithms of the squared errors of speeds behind cut-offs, summed over joints that move.
+
+    Parameters
+    ----------
+    q : (T, n) positions.
+    rate_hz : of the samples.
+    cutoffs : the first is the usual one.
+    """
+    noise, gains = _noise(q, rate_hz, cutoffs[0]), [SpeedGain(rate_hz, one) for one in cutoffs]
+    moves = np.ptp(q, axis=0) > _MOVES * noise
+    v = central_difference(lowpass(q, rate_hz, cutoffs[0]), rate_hz)
+    jump = _JUMP * np.sqrt(np.mean(central_difference(v, rate_hz) ** 2, axis=0))
+    squares = [(noise * one.noise) ** 2 + (jump * one.rounding) ** 2 for one in gains]
+    return np.sum(np.log(np.array(squares)[:, moves]), axis=1)
 
 
-def _rms_acceleration(q: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
-    """Root mean square of the acceleration behind a low-pass, (n,)."""
-    smooth = lowpass(q, rate_hz, cutoff_hz)
-    a = central_difference(central_difference(smooth, rate_hz), rate_hz)
-    return np.sqrt(np.mean(a**2, axis=0))
+def _noise(q: np.ndarray, rate_hz: float, usual_hz: float) -> np.ndarray:
+    """Standard deviation of the noise in positions, (n,) rad or m.
+
+    The largest that is seen at any rate at which a motion is still smooth: of what a drive has
+    filtered before it was recorded little is left near half the rate of the samples.
+    """
+    slowest = max(1, int(rate_hz / (_NOISE_RATE * usual_hz)))
+    every = [2**k for k in range(slowest.bit_length())]
+    seen = [encoder_noise_std(q[::k]) for k in every]
+    steps = resolution(q) / np.sqrt(12.0)
+    return np.max([*seen, steps, _DIGITS * np.abs(q).max(axis=0)], axis=0)

@@ -15,6 +15,7 @@ from dynident.recording import (
     Recording,
     as_points,
     count_rows,
+    default_filter,
     turning_round,
     uniform,
     unwrapped_notes,
@@ -66,10 +67,14 @@ class RecordFacts:
 
 def record_facts(study: Study) -> tuple[RecordFacts, ...]:
     """Return the facts of each record that a study uses, in its order."""
+    settings = study.train.filter
     found = []
     for some in by_record(study):
         one = some[0]
-        rows = [count_rows(uniform(entry), study.train.filter_of(entry)).used for entry in some]
+        rows = [
+            count_rows(uniform(entry), settings or default_filter(entry.rate_hz)).used
+            for entry in some
+        ]
         gone = dict.fromkeys(
             f"{stretch.reason} {stretch.start:.4g} to {stretch.stop:.4g} s"
             for entry in some

@@ -79,11 +79,12 @@ def filter_of(said: FilterEntry | None, recordings: list[Recording]) -> Filter |
     cutoff = said.cutoff_hz if isinstance(said.cutoff_hz, float) else None
     position = said.position_cutoff_hz
     is_recipe = said.decimation != "pick" or said.ends != "drop"
+    usual = position == "default"
     if position == "default":
         position = default_position_cutoff(min(one.rate_hz for one in recordings), cutoff)
     if said.cutoff_hz == "default" and position != "none" and not is_recipe:
         cutoff, values["rate_hz"] = default_cutoff(position, said.rate_hz)
-    if said.position_cutoff_hz == "default" and not is_recipe:
+    if usual and not is_recipe:
         position = suited_position_cutoff(recordings, cutoff)
     values |= {"position_cutoff_hz": None if position == "none" else position, "cutoff_hz": cutoff}
     return Filter(**values)

@@ -66,7 +66,8 @@ class FilterEntry(SettingsTable):
     a low-pass shifts the instant at which dry friction turns round."""
     cutoff_hz: Rate | Literal["default", "none"] = "default"
     """The same low-pass on every column and on the torque; `"none"` for none. By default 0.45 of
-    the positions' cut-off, above which these predict no torque; none where positions are not
+    the positions' cut-off where that is stated (above it these predict no torque), else of the
+    usual one; none where positions are not
     filtered, `decimation` is `"chebyshev"`, or `ends` are kept."""
     rate_hz: Rate | None = None
     """Decimated to about this. Without it every sample is kept; where the cut-off is the default

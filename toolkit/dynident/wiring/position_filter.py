@@ -24,7 +24,7 @@ from dynident.recording import (
     Filter,
     default_cutoff,
     default_position_cutoff,
-    suited_position_cutoff,
+    usual_position_cutoffs,
 )
 from dynident.tables import listed, percent
 from dynident.wiring.fault import Fault
@@ -57,8 +57,7 @@ def unsuitable_position_filter(
     if stated is None:
         return ()
     usual_hz = default_position_cutoff(rate_hz, stated.cutoff_hz)
-    suited_hz = suited_position_cutoff(dataset.recordings, stated.cutoff_hz)
-    if stated.position_cutoff_hz in (usual_hz, suited_hz):
+    if stated.position_cutoff_hz in usual_position_cutoffs(rate_hz, stated.cutoff_hz):
         return ()
     usual = replace(stated, position_cutoff_hz=usual_hz)
     try:

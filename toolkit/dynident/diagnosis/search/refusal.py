@@ -26,7 +26,7 @@ from dynident.model import (
     impossible_joints,
     levels_not_met,
 )
-from dynident.recording import Dataset
+from dynident.recording import Dataset, default_filter
 from dynident.tables import percent
 
 
@@ -135,8 +135,8 @@ def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
     """
     if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
         return ()
-    slowest = min(train.recordings, key=lambda one: one.rate_hz)
-    criteria, own, rate = evidence.criteria, train.filter_of(slowest), slowest.rate_hz
+    rate = min(one.rate_hz for one in train.recordings)
+    criteria, own = evidence.criteria, train.filter or default_filter(rate)
     found = []
     for share in (criteria.gates.filter_share, criteria.gates.second_filter_share):
         lower = replace(train, filter=own.narrowed(share, rate))

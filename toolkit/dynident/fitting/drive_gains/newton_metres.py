@@ -13,7 +13,7 @@ from dynident.recording import (
     MotionInParts,
     Noise,
     Recording,
-    suited_filter,
+    default_filter,
     uniform,
 )
 from dynident.robot import Robot
@@ -56,7 +56,7 @@ def _load_torque(
     recording: Recording, settings: Filter | None, phi: np.ndarray, robot: Robot
 ) -> np.ndarray:
     """Torque of a body on the last joint at every sample, (T, n) N m or N."""
-    settings = settings or suited_filter((recording,))
+    settings = settings or default_filter(recording.rate_hz)
     every = replace(settings, ends="keep", edge_s=(0.0, 0.0))
     motion = MotionInParts(recording, every).whole
     theta = np.zeros(10 * robot.n)

@@ -25,7 +25,7 @@ from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.uncertainty.expected_bias import listed, reported
 from dynident.fitting.uncertainty.noisy_part import NoisyPart
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, default_filter
 from dynident.tables import number
 
 _MOST = 16384
@@ -154,13 +154,14 @@ def input_bias(
     whole, noise_alone = (np.zeros(model.size) for _ in range(2))
     whole[kept] = sums.bias(sums.noise + sums.hidden)
     noise_alone[kept] = sums.bias(sums.noise)
+    settings = dataset.filter or default_filter(dataset.recordings[0].rate_hz)
     return InputBias(
         model=model,
         values=whole,
         trembling=whole - noise_alone,
         sigma=sigma,
         position_std=np.sqrt(np.mean(np.square(stds), axis=0)),
-        filtered=dataset.filter_of(dataset.recordings[0]).position_cutoff_hz is not None,
+        filtered=settings.position_cutoff_hz is not None,
     )
 
 

@@ -18,6 +18,7 @@ from dynident.recording import (
     Filter,
     Motion,
     Recording,
+    default_filter,
     default_position_cutoff,
     differentiate,
 )
@@ -96,7 +97,7 @@ class NoisyPart:
         -------
         With the share of the recording that it is.
         """
-        rate, settings = recording.rate_hz, dataset.filter_of(recording)
+        rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
         cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
         # Without a low-pass the true motion is sought behind one, and noise is added without.
         behind = replace(settings, position_cutoff_hz=cutoff)
