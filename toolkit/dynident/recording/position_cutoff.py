@@ -44,8 +44,8 @@ _LEAST = 400  # samples of a part that is looked at
 _MOVES = 20.0  # range of a joint that moves over the noise of its positions
 _NOISE_RATE = 5.0
 """Rate down to which noise is looked for, over the usual cut-off."""
-_DIGITS = 1e-12
-"""Of a position's size, that its low-pass keeps."""
+DIGITS = 1e-12
+"""Of a position's size, that its low-pass keeps: some joints stand exactly."""
 
 
 @dataclass(frozen=True)
@@ -197,4 +197,4 @@ def _noise(q: np.ndarray, rate_hz: float, usual_hz: float) -> np.ndarray:
     every = [2**k for k in range(slowest.bit_length())]
     seen = [encoder_noise_std(q[::k]) for k in every]
     steps = resolution(q) / np.sqrt(12.0)
-    return np.max([*seen, steps, _DIGITS * np.abs(q).max(axis=0)], axis=0)
+    return np.max([*seen, steps, DIGITS * np.abs(q).max(axis=0)], axis=0)

@@ -12,11 +12,9 @@ from scipy.ndimage import maximum_filter1d
 
 from dynident.fitting.sampling import BLOCK, Sampled
 from dynident.recording import MotionInParts
-from dynident.recording.position_cutoff import SpeedGain
+from dynident.recording.position_cutoff import DIGITS, SpeedGain
 from dynident.recording.white_noise import encoder_noise_std
 
-DIGITS = 1e-12
-"""Of a position's size, that its low-pass keeps: some joints stand exactly."""
 _RINGING = 0.1
 """Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
 constant 1 / (2 pi cut-off)."""

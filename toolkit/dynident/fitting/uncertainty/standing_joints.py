@@ -15,10 +15,11 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from dynident.criteria import DEFAULTS, StickingCriteria
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
-from dynident.fitting.uncertainty.joint_speeds import DIGITS, JointSpeeds
+from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.formulas import quoted_joint
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, uniform
+from dynident.recording.position_cutoff import DIGITS
 from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import listed, number, percent
 
