@@ -121,9 +121,7 @@ def suited_position_cutoff(recordings: Sequence[Recording], cutoff_hz: float | N
     if len(tried) == 1:
         return tried[0]
     try:
-        parts = [part for one in recordings for part in _parts(one)]
-        rates = [one.rate_hz for one in recordings for _ in _parts(one)]
-        errors = [_errors(q, rate, tried) for q, rate in zip(parts, rates, strict=True)]
+        errors = [_errors(q, one.rate_hz, tried) for one in recordings for q in _parts(one)]
     except RecordingError:  # which whoever samples the recording will tell, with its place
         return tried[0]
     return tried[int(np.argmin(np.sum(errors, axis=0)))] if errors else tried[0]
