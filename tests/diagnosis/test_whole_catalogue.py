@@ -11,7 +11,7 @@ from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
 from dynident.effects import effects_of
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Filter, Recording
 from synthetic import arm, smooth_motion
 
 NAMES = ("shoulder", "elbow")
@@ -88,6 +88,20 @@ def test_a_hidden_effect_is_found(
     assert found.test_error.noise_floor is not None
     assert found.test_error.before > 1.05 * found.test_error.after
     assert found.test_error.after < 1.15 * found.test_error.noise_floor
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edge_s", [0.05, 0.1])
+def test_a_spring_is_found_whose_resonance_the_data_do_not_tell(edge_s: float) -> None:
+    """The stiffness says all: that the best resonance lies above what samples tell is no reason."""
+    made = recordings(*truth("joint_elasticity@shoulder", (2e-3,), (9.0, 0.08, 0.3)))
+    settings = Filter(
+        position_cutoff_hz=80.0, cutoff_hz=18.0, rate_hz=50.0, edge_s=(edge_s, edge_s)
+    )
+    found = find(PLAIN, Dataset(tuple(made[:-1]), settings), Dataset(tuple(made[-1:]), settings))
+    assert found.verdict == "explained"
+    assert [step.effect.label for step in found.steps] == ["joint_elasticity@shoulder"]
+    assert found.steps[0].values[0] == pytest.approx(2e-3, rel=0.05)
 
 
 @pytest.mark.slow

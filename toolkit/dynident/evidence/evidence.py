@@ -90,6 +90,11 @@ class Evidence:
         every = (one.tau for run in self.runs for one in run.replicates)
         return np.max([np.abs(tau).max(axis=0) for tau in every], axis=0)
 
+    @cached_property
+    def longest_step(self) -> float:
+        """The longest time between two samples of any recording, s."""
+        return max(1.0 / run.recording.rate_hz for run in self.runs)
+
     def speed_classes(self, joint: int) -> SpeedClasses:
         """Classes of a joint's speed wherever replicates tell its noise."""
         if joint not in self._speed_classes:

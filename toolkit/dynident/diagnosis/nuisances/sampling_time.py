@@ -61,7 +61,7 @@ def sampling_time(
     least_share : of the squared systematic residual, that a delay must explain.
     """
     least = least_share * fitted.error_signal
-    step = max(1.0 / run.recording.rate_hz for run in evidence.runs)
+    step = evidence.longest_step
     held = evidence.runs[0].recording.torque == "held_command"
     found = [
         score

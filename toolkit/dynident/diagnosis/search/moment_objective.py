@@ -210,8 +210,15 @@ class MomentObjective:
         )
 
     def _judged(self, found: Score) -> ScoreTrial:
-        possible = not impossible(found, self.fitted)
-        return ScoreTrial(found=found, loss=-found.drop_at_point, admissible=possible)
+        # What the samples do not tell is no better shape, however little it leaves: a spring that
+        # only gives way, and never resonates, is explained by any stiffness that is high enough.
+        step = self.evidence.longest_step
+        return ScoreTrial(
+            found=found,
+            loss=-found.drop_at_point,
+            admissible=not impossible(found, self.fitted)
+            and not found.effect.unresolved(found.values, step),
+        )
 
     def _differentiated(self, effect: Effect) -> ScoreTrial:
         """The trial of an effect with its square root and derivatives."""

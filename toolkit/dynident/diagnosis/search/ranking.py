@@ -331,7 +331,7 @@ def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, le
         return "explains less than its parameters cost"
     if one.share < least:
         return f"explains only {100 * one.share:.2g} % of the squared residual"
-    if why := one.effect.unresolved(one.values, _step(evidence)):
+    if why := one.effect.unresolved(one.values, evidence.longest_step):
         return why
     if one.gains is None:
         return "other effects explain more"
@@ -375,9 +375,5 @@ def unresolved(evidence: Evidence, fitted: EvidenceFit, label: str) -> str:
     label : of the effect.
     """
     (effect,) = (one for one in fitted.model.effects if one.label == label)
-    return effect.unresolved(fitted.values[fitted.model.slices[label]].tolist(), _step(evidence))
-
-
-def _step(evidence: Evidence) -> float:
-    """The longest time between two samples, s."""
-    return max(1.0 / run.recording.rate_hz for run in evidence.runs)
+    values = fitted.values[fitted.model.slices[label]].tolist()
+    return effect.unresolved(values, evidence.longest_step)
