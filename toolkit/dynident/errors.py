@@ -5,6 +5,12 @@ A message says what is wrong, where (file, joint, row), and the remedy.
 
 from __future__ import annotations
 
+import inspect
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 
 class DynidentError(Exception):
     """Something the user can put right.
@@ -119,3 +125,48 @@ class SimulationError(DynidentError):
 
 class DynidentWarning(UserWarning):
     """The result stands, with a caveat that the user should read."""
+
+
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def without_warnings() -> Iterator[None]:
+    """Warn of nothing in what is only tried: whoever uses the outcome is the one to warn of it.
+
+    Python's own filters of warnings would forget what was said before, and belong to the user.
+    """
+    before = _quiet.set(True)
+    try:
+        yield
+    finally:
+        _quiet.reset(before)
+
+
+def warn(text: str) -> bool:
+    """Warn of something, at the line outside this package that led to it.
+
+    Parameters
+    ----------
+    text : what, where and the remedy.
+
+    Returns
+    -------
+    Whether it was said; False inside `without_warnings`.
+
+    Warns
+    -----
+    DynidentWarning
+    """
+    if _quiet.get():
+        return False
+    package = __name__.partition(".")[0]
+    outside = level = 1  # 1 is this function
+    frame = inspect.currentframe()
+    while frame is not None:
+        level += 1
+        if frame.f_globals.get("__name__", "").partition(".")[0] == package:
+            outside = level
+        frame = frame.f_back
+    warnings.warn(text, DynidentWarning, stacklevel=min(outside, level - 1))
+    return True

@@ -88,6 +88,14 @@ class Shown:
         """Print the tables and sentences to the terminal."""
         print_tables(*self.tables())
 
+    def summary(self) -> str:
+        """The tables and sentences as text, which is what Python prints of it as well."""
+        return "\n".join(str(part) for part in self.tables())
+
+    def __repr__(self) -> str:
+        # In place of all fields, arrays of residuals among them, which nobody can read.
+        return self.summary()
+
     def _repr_html_(self) -> str:
         """Show the same in a notebook."""
         return "".join(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import progress
 from dynident.cli.work import STUDY, load_study, require_picture, require_places, with_drives
-from dynident.errors import DynidentWarning
+from dynident.errors import warn
 
 if TYPE_CHECKING:
     from dynident.fitting import Estimate, Method
@@ -54,7 +53,7 @@ class _Files:
             if broken:
                 what = f"{self.robot}: no rigid body can have the parameters of {', '.join(broken)}"
                 left = "What the data cannot tell was left as given; --consistency full fits others"
-                warnings.warn(f"{what}. {left}", DynidentWarning, stacklevel=1)
+                warn(f"{what}. {left}")
         if self.plot is not None and estimate.history is not None:
             from dynident.reporting.pictures.convergence import convergence
             from dynident.reporting.pictures.plots import save

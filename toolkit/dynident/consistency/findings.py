@@ -18,7 +18,7 @@ _RELATIVE = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Check(Shown):
     """Which links of a robot are impossible, by which rule and by how much.
 

@@ -54,7 +54,7 @@ _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Answer:
     """What a diagnosis has found, and what is said of it.
 

@@ -15,7 +15,7 @@ from dynident.tables import Shown, Table, finite, mostly_noise, number, p_value,
 from dynident.wiring import Fault
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Diagnosis(Answer, Shown):
     """The answer of `diagnose`: see `Answer` for what it holds."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import warnings
 from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -15,7 +14,7 @@ from dynident.arguments import checked
 from dynident.effects.effect import Effect
 from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
 from dynident.effects.laws import PREFIX, Law, LawEffect, law_effect
-from dynident.errors import DynidentWarning, EffectError
+from dynident.errors import EffectError, warn
 from dynident.settings import nearest
 
 ENTRY_POINTS = "dynident.effects"
@@ -63,7 +62,7 @@ def _load_packages() -> None:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             where = f"the package {_package(one)} are missing: {one.value} fails"
             said = f"effects of {where} ({reason})"
-            warnings.warn(said, DynidentWarning, stacklevel=2)
+            warn(said)
 
 
 @checked

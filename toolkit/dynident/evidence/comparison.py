@@ -27,7 +27,7 @@ from dynident.validation.validation_result import Loop, loop_table
 from dynident.wiring import Fault, check_wiring
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Comparison(Shown):
     """Errors of several estimates on the same recordings.
 

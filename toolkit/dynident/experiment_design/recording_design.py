@@ -40,7 +40,7 @@ class LoadTried:
     why: str = ""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class RecordingDesign(Shown):
     """The answer of `design`.
 

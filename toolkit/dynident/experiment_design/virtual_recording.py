@@ -57,7 +57,7 @@ def record_virtually(
     return replace(truth, runs=(run,), seed=seed).run()[0]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ClosedDesignLoop(Shown):
     """A diagnosis, the recording designed for what it left open, and the diagnosis with it.
 

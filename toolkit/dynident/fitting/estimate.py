@@ -57,7 +57,7 @@ class ShapeValue:
 
 
 @checked
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate(Shown):
     """Identified parameters of a model.
 
@@ -252,10 +252,6 @@ class Estimate(Shown):
             *proved,
             *self.notes,
         )
-
-    def summary(self) -> str:
-        """The tables as text."""
-        return "\n".join(str(part) for part in self.tables())
 
     def _parameter_notes(self) -> tuple[str, ...]:
         return (

@@ -68,7 +68,7 @@ class RobotComparison:
     p_adjusted: float
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Fleet(Shown):
     """Robots of one kind, and which differs from the others in what.
 

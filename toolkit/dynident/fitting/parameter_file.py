@@ -10,7 +10,6 @@ joint's viscous friction, as in Ting et al. (RSS 2006). Inertias are about the o
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from dynident import files
-from dynident.errors import DynidentWarning, FileError
+from dynident.errors import FileError, warn
 from dynident.inertia import LARGEST, PAPER_ORDER, PARAMETERS
 from dynident.model import Model
 from dynident.recording.formats.text.text_head import is_number
@@ -206,7 +205,7 @@ class _ParameterReader:
         if len(found) < len(named):
             words = "viscous friction is not in the model, and is left out"
             lost = ", ".join(name for name in named if name not in found)
-            warnings.warn(f"{self.file}: {words} ({lost})", DynidentWarning, stacklevel=2)
+            warn(f"{self.file}: {words} ({lost})")
         return found
 
     def _known(self, name: str) -> str:

@@ -85,6 +85,10 @@ class ParametrisedRobot:
             raise EffectError(what, remedy="give one for all of them, or one for each")
         object.__setattr__(self, "effects", checked)
 
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.label for effect in self.effects) or "no effects"
+        return f"<Model of {self.robot!r}; {effects}>"
+
     @cached_property
     def friction_widths(self) -> np.ndarray:
         """Friction width of each joint, (n,) rad/s or m/s."""

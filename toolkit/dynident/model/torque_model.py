@@ -14,7 +14,7 @@ from dynident.model.parametrised_robot import ParametrisedRobot
 
 
 @checked
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model(ParametrisedRobot):
     """A robot and its effects, as a torque that is linear in its parameters.
 

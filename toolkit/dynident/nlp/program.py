@@ -36,19 +36,8 @@ _REMEDIES = {
 }
 
 
-class _Printed(Shown):
-    """What is printed as tables."""
-
-    def tables(self) -> tuple[Table, ...]:
-        """All that it holds, as it is to be read."""
-        raise NotImplementedError
-
-    def __str__(self) -> str:
-        return "\n".join(str(table) for table in self.tables())
-
-
-@dataclass(frozen=True, eq=False)
-class Program(_Printed):
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(Shown):
     """Minimise 1/2 sum |residual|^2 + sum of costs over named variables, under constraints.
 
     A sum: `program + block` is a new program with a block more, and leaves the other as it was.
@@ -237,8 +226,8 @@ class Program(_Printed):
         return ProgramSolution(**vars(best), program=self, starts=attempts)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ProgramSolution(Attempt, _Printed):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ProgramSolution(Attempt, Shown):
     """The best of the starts: one with a solution before one without, then the lowest objective.
 
     Attributes

@@ -64,6 +64,13 @@ class Dataset:
                 what = f"joints {', '.join(recording.joints)} where the others have {ours}"
                 raise RecordingError(what, recording.where, "use `Recording.select`")
 
+    def __repr__(self) -> str:
+        seconds = sum(one.duration for one in self.recordings)
+        names = ", ".join(one.name or one.where for one in self.recordings) or "none"
+        filter = f"; {self.filter!r}" if self.filter else ""
+        number = "1 recording" if len(self) == 1 else f"{len(self)} recordings"
+        return f"<Dataset of {number}, {seconds:.4g} s: {names}{filter}>"
+
     def __len__(self) -> int:
         return len(self.recordings)
 

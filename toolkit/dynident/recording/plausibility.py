@@ -5,12 +5,11 @@ Plausible ranges of robots, not units that are computed with: a library of units
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, warn
 from dynident.recording.masks import within
 from dynident.recording.recording import Recording
 from dynident.tables import percent
@@ -54,7 +53,7 @@ def warn_of_units(recording: Recording, kinds: Sequence[str] | None = None) -> N
         remedy = "convert it, or give its scale in the column mapping"
         if column.startswith("temperature."):
             remedy = "subtract 273.15"
-        warnings.warn(f"{where}: {oddity} If so, {remedy}", DynidentWarning, stacklevel=3)
+        warn(f"{where}: {oddity} If so, {remedy}")
 
 
 def _oddities(recording: Recording, kinds: Sequence[str] | None):
@@ -118,7 +117,7 @@ def warn_of_missing_torque(recordings: Sequence[Recording]) -> None:
     missing = [name for name, there in zip(recordings[0].joints, some, strict=True) if not there]
     if missing:
         what = f"{recordings[0].where}: the torque of {', '.join(missing)} is zero throughout"
-        warnings.warn(f"{what}. Is it the right column?", DynidentWarning, stacklevel=3)
+        warn(f"{what}. Is it the right column?")
 
 
 def warn_of_limited_torque(recordings: Sequence[Recording]) -> None:
@@ -147,7 +146,7 @@ def warn_of_limited_torque(recordings: Sequence[Recording]) -> None:
             "the drive, or of the log, or a steady motion? What a log cuts off no model predicts: "
             "if so, record within its range, or leave these times out by a window"
         )
-        warnings.warn(what, DynidentWarning, stacklevel=3)
+        warn(what)
 
 
 def _share_at(recordings: Sequence[Recording], joint: int, sign: float, end: float) -> float:
@@ -207,10 +206,8 @@ def require_motion(recordings: Sequence[Recording], kinds: Sequence[str]) -> Non
     if still:
         names = ", ".join(still)
         what = f"{where}: {names} stands still in every training recording, so that its friction"
-        warnings.warn(
-            f"{what} and part of the inertias cannot be identified. Record a motion of every joint",
-            DynidentWarning,
-            stacklevel=3,
+        warn(
+            f"{what} and part of the inertias cannot be identified. Record a motion of every joint"
         )
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, warn
 from dynident.recording.recording import SIGNALS, Recording
 
 TOLERANCE = 1e-3
@@ -25,12 +24,13 @@ _LONGEST_STALE = 5
 """Repeated rows in a run up to which they are a stale reading, not a robot at rest."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Even:
-    """A recording on a uniform clock, and the warning that goes with it."""
+    """A recording on a uniform clock, the warning that goes with it, and whether it was said."""
 
     recording: Recording
     words: str
+    said: bool = False
 
 
 _EVEN: WeakKeyDictionary[Recording, _Even] = WeakKeyDictionary()
@@ -69,8 +69,8 @@ def uniform(recording: Recording) -> Recording:
     Warns
     -----
     DynidentWarning
-        If it was resampled, naming the jitter and how many rows were dropped. The spread of true
-        sampling instants about their stamps becomes noise that no filter undoes.
+        Once, if it was resampled, naming the jitter and how many rows were dropped. The spread of
+        true sampling instants about their stamps becomes noise that no filter undoes.
     """
     even = _EVEN.get(recording) or _shared(recording)
     if even is None:
@@ -79,7 +79,7 @@ def uniform(recording: Recording) -> Recording:
             return recording
         even = _resampled(recording, step)
     _EVEN[recording] = even
-    warnings.warn(f"{recording.where}: {even.words}", DynidentWarning, stacklevel=2)
+    even.said = even.said or warn(f"{recording.where}: {even.words}")
     return even.recording
 
 
@@ -94,7 +94,7 @@ def _shared(recording: Recording) -> _Even | None:
             same = {name: getattr(done, name) for name in ("t", *SIGNALS)}
             filter = _history(recording, done.rate_hz)
             source = replace(recording.provenance, filter=filter)
-            return _Even(recording.replace(provenance=source, **same), even.words)
+            return _Even(recording.replace(provenance=source, **same), even.words, even.said)
     return None
 
 

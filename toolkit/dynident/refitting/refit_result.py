@@ -65,7 +65,7 @@ class TorqueErrors:
 _OF_SHAPES = {"centre_of_mass", "spread"}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Refit(Shown):
     """Given parameters, made consistent.
 

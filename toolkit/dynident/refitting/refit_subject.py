@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from dynident import files
-from dynident.errors import DynidentWarning, FileError, RobotError
+from dynident.errors import FileError, RobotError, warn
 from dynident.fitting import Estimate, load_estimate
 from dynident.fitting.parameter_file import GivenParameters, read_parameters
 from dynident.inertia import LARGEST, PARAMETERS
@@ -181,7 +180,7 @@ def in_study(subject: RefitSubject, model: Model) -> RefitSubject:
         lost = [one.label for one in estimate.model.effects if one not in known]
         if lost:
             words = f"effects of the estimate that the study has otherwise: {', '.join(lost)}"
-            warnings.warn(f"{words}; their values are not used", DynidentWarning, stacklevel=3)
+            warn(f"{words}; their values are not used")
     return replace(subject, robot=robot, effects=effects)
 
 

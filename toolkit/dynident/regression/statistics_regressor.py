@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from numbers import Real
 from typing import Any, ClassVar, Self, cast
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from dynident.errors import DynidentWarning, FitError
+from dynident.errors import FitError, warn
 from dynident.moments import SecondMoments
 
 _checked: Any = validate_data  # whose signature names strings only
@@ -78,7 +77,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         except FitError as error:
             if hasattr(self, "coef_") or seen.count > seen.inputs + 1:
                 raise
-            warnings.warn(f"not fitted yet: {error}", DynidentWarning, stacklevel=2)
+            warn(f"not fitted yet: {error}")
         self.statistics_ = seen
         return self
 

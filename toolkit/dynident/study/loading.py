@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, effects_of, law_effect, laws_of
-from dynident.errors import DynidentError, DynidentWarning, EffectError, StudyError
+from dynident.errors import DynidentError, EffectError, StudyError, warn
 from dynident.fitting.drive_gains import (
     DriveGains,
     GainProblem,
@@ -70,6 +69,9 @@ class Study:
     digest: str = ""
     modules: Permission = "trusted"
 
+    def __repr__(self) -> str:
+        return f"<Study {self.path}\n  {self.model}\n  train {self.train}\n  test {self.test}>"
+
     @property
     def robot(self) -> Robot:
         """The robot as its description gives it."""
@@ -125,7 +127,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
             if why is not None and law.name in said.laws:
                 raise why
             if why is not None:  # of another robot's file
-                warnings.warn(f"{why}; it is not tried", DynidentWarning, stacklevel=2)
+                warn(f"{why}; it is not tried")
         effects = tuple(one for label in said.effects for one in effects_of(label, robot, laws))
         model = Model(robot, effects, _widths(said.friction_width, robot), laws)
     except DynidentError as error:

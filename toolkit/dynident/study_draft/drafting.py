@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -14,7 +13,7 @@ import numpy as np
 
 from dynident.arguments import checked
 from dynident.data_files import find_all
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, without_warnings
 from dynident.model import Model
 from dynident.recording import (
     Column,
@@ -335,9 +334,8 @@ def _of_joints(
 
 def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
     robot = reading.robot
-    with warnings.catch_warnings():
+    with without_warnings():
         # The draft looks for other units itself, and says what it finds.
-        warnings.simplefilter("ignore", DynidentWarning)
         each = [
             read(
                 log.file,
@@ -354,8 +352,7 @@ def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
 
 def _without_gaps(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
     """Recordings as they are, or the error that their study would end with."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DynidentWarning)
+    with without_warnings():
         for one in recordings:
             uniform(one)
     return recordings

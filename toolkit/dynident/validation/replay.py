@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.closed_loop import Controller, Mechanism
 from dynident.criteria import DEFAULTS, Criteria, LoopCriteria
-from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
+from dynident.errors import DynidentError, RecordingError, SimulationError, without_warnings
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
 from dynident.model import Model
@@ -121,9 +120,8 @@ def loop_of(
     if controller is None or not has_reference(dataset):
         return None
     try:
-        with warnings.catch_warnings():
+        with without_warnings():
             # What is to be said of the recordings was said when they were compared.
-            warnings.simplefilter("ignore", DynidentWarning)
             found = simulate_again(judged, dataset, controller, criteria)
     except DynidentError as error:
         return Unsimulated(str(error))

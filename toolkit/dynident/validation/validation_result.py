@@ -46,7 +46,7 @@ class Skipped:
     reason: str
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Validation(Shown):
     """A model in the closed loop in which it was measured.
 

@@ -8,7 +8,6 @@ leave far less of the very same torque is right.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from dynident.criteria import WiringCriteria
 from dynident.effects import effects_of
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, without_warnings
 from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import (
@@ -136,9 +135,7 @@ def _rows(model: Model, dataset: Dataset, most: int) -> Iterator[tuple[np.ndarra
         if recording.window is None and recording.duration > _SECONDS:
             first = float(recording.t[0])
             recording = recording.replace(window=(first, first + _SECONDS))
-        with warnings.catch_warnings():
-            # Whoever fits the recording is the one to warn of its clock.
-            warnings.simplefilter("ignore", DynidentWarning)
+        with without_warnings():
             every.append(sample(recording.replace(period=None), dataset.filter))
         seconds += every[-1].count / every[-1].rate_hz
         if seconds >= _SECONDS:

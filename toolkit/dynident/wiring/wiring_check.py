@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
 
 from dynident.criteria import DEFAULTS, WiringCriteria
-from dynident.errors import DynidentWarning
+from dynident.errors import without_warnings
 from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -79,9 +78,7 @@ def check_wiring(
 def _but_stops(model: Model, train: Dataset) -> Dataset:
     """Recordings without the rows around stops: every joint has dry friction in these fits."""
     once = tuple(one.replace(period=None) for one in train.recordings)
-    with warnings.catch_warnings():
-        # Whoever fits the recordings is the one to warn of their clocks.
-        warnings.simplefilter("ignore", DynidentWarning)
+    with without_warnings():
         return without_stops(
             Model(model.robot) + "coulomb_friction", replace(train, recordings=once)
         )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.errors import DynidentWarning
+from dynident.errors import without_warnings
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset
 
@@ -80,9 +79,7 @@ def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
     duration = 0.0
     each = max(20, -(-most // len(dataset.recordings)))
     for recording in dataset.recordings:
-        with warnings.catch_warnings():
-            # Whoever fits the recording is the one to warn of its clock.
-            warnings.simplefilter("ignore", DynidentWarning)
+        with without_warnings():
             one = sample(recording.replace(period=None), dataset.filter)
         duration += len(one.t) / one.rate_hz
         at = np.unique(np.linspace(0, len(one.t) - 1, min(each, len(one.t))).round().astype(int))

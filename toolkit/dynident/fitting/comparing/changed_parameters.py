@@ -41,7 +41,7 @@ class ParameterChange:
     has_changed: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class EstimateChanges(Shown):
     """What two estimates of one robot say of the time between them.
 

@@ -34,7 +34,7 @@ from dynident.tables import Shown, Table, number
 from dynident.threads import single_threaded
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Projection(Shown):
     """The nearest estimate within a set.
 

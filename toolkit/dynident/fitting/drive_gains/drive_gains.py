@@ -18,7 +18,7 @@ _WEAK = 0.3  # relative standard deviation of a gain
 _Z = 1.959964  # of a 95 % interval
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class DriveGains(Shown):
     """Torque per unit of each joint's drive.
 

@@ -16,7 +16,7 @@ UNITS = ("N", "N", "N", "N m", "N m", "N m")
 _MUCH_LEFT = 0.2  # of a component
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SensedLoads(Shown):
     """Loads that a wrench sensor weighs; no drive has a part in it.
 

@@ -7,7 +7,6 @@ turning joints at the sensor, all of which stand still.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
@@ -16,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.errors import DynidentWarning, StudyError
+from dynident.errors import StudyError, without_warnings
 from dynident.fitting.loads import Load, LoadSplit, split
 from dynident.fitting.sampling import BLOCK, Sampled, sample
 from dynident.inertia import frame_change
@@ -203,7 +202,6 @@ class WrenchProblem:
             q[:, :n] += std * rng.normal(size=(len(q), n))
             return recording.replace(q=q)
 
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DynidentWarning)  # told of the recordings themselves
+        with without_warnings():
             recordings = tuple(map(shaken, self.dataset.recordings))
         return replace(self, dataset=replace(self.dataset, recordings=recordings))

@@ -6,7 +6,6 @@ of a table are the messages that hold the joints that are asked for; all others 
 
 from __future__ import annotations
 
-import warnings
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, warn
 from dynident.recording.formats.column_table import ColumnTable
 from dynident.recording.formats.limits import ARRAYS, require_few, require_unpacked
 
@@ -177,7 +176,7 @@ class JointStates:
             where = f"{self.where}, message {min(missing)}"
             raise RecordingError(what, where, "stamp every message, or none")
         what = "no message has a time stamp: when it was received stands in its place"
-        warnings.warn(f"{self.where}: {what}", DynidentWarning, stacklevel=2)
+        warn(f"{self.where}: {what}")
         return False
 
     def _with(self, wanted: Sequence[str]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynident.arguments import checked
-from dynident.errors import DynidentWarning, RecordingError
+from dynident.errors import RecordingError, warn
 from dynident.recording.formats.column_names import (
     OPTIONAL,
     PARTIAL,
@@ -115,7 +114,7 @@ def _turned(recording: Recording, names: Sequence[str], kinds: Sequence[str]) ->
     if found.provenance.unwrapped:
         columns = ", ".join(f"q.{name}" for name in found.provenance.unwrapped)
         what = f"{found.where}, column {columns}: {UNWRAPPED}"
-        warnings.warn(what, DynidentWarning, stacklevel=3)
+        warn(what)
     turn = tuple(name for name, kind in zip(names, kinds, strict=True) if kind == "continuous")
     return found.replace(continuous=turn)
 

@@ -6,13 +6,12 @@ one turn, as in [-pi, pi), so that it jumps by 2 pi where it crosses the end: no
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.errors import DynidentWarning
+from dynident.errors import warn
 from dynident.recording.recording import Recording
 from dynident.recording.repetition import TURN
 from dynident.recording.spooled import Spool
@@ -100,7 +99,7 @@ def _warn_of_others(recording: Recording, joint: int, added: _Added) -> None:
             f"{recording.where}: q.{recording.joints[joint]} jumps {len(others)} times by what is "
             f"no whole turn, first at t = {recording.t[others[0]]:.6g} s, and that is left as it is"
         )
-        warnings.warn(what, DynidentWarning, stacklevel=3)
+        warn(what)
 
 
 def within_limits(

@@ -11,13 +11,12 @@ equations, and is made up for that; N are those that a band has, two per hertz a
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from dynident.errors import DynidentError, DynidentWarning
+from dynident.errors import DynidentError, without_warnings
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import sample
 from dynident.model import Model
@@ -111,7 +110,6 @@ def _begin(one: Recording, samples: int) -> Recording:
 
 def _factors(model: Model, recordings: Sequence[Recording], settings: Filter) -> TriangularFactors:
     """Factors of all rows behind a filter."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
+    with without_warnings(), np.errstate(all="ignore"):
         # Whoever fits the recordings is the one to warn of their clock.
-        warnings.simplefilter("ignore", DynidentWarning)
         return combine([factorise(sample(one, settings).rows(model)) for one in recordings])
