@@ -98,7 +98,10 @@ def virtual_jacobian(h: ArrayLike) -> NDArray[np.float64]:
     jacobian = np.zeros((11, 11))
     jacobian[0, 0] = 2.0 * root
     jacobian[1:4, 0] = 2.0 * root * com
-    jacobian[4:10, 0] = _six(2.0 * root * (com @ com * np.eye(3) - np.outer(com, com)))
+    # As squares of distances from the axes: of a centre far along one of them, |com|^2 less the
+    # square along it keeps no digit.
+    from_axes = np.cross(np.eye(3), com)
+    jacobian[4:10, 0] = _six(2.0 * root * (from_axes @ from_axes.T))
     for k, axis in enumerate(np.eye(3)):
         jacobian[1 + k, 1 + k] = mass
         product = np.outer(axis, com)
