@@ -71,7 +71,7 @@ def test_the_parallel_axis_theorem(h):
 
 
 # A thin body far out along an axis: about that axis its inertia is a difference of nothing.
-@example(np.array([2e-4, -0.25, 160.0, 0.0, 0.06, 0.0, 2e-3, 0.0, 0.05, 0.0, -0.7]))
+@example(np.array([1.7e-4, -0.2515, 161.6175, 0.0, 0.058, 0.0, 0.0023, 0.0, 0.047, 0.0, -0.7]))
 @given(choices())
 @many
 def test_jacobian_is_that_of_automatic_differentiation(h):

@@ -13,7 +13,7 @@ import numpy as np
 
 from dynident.consistency.rules import Array, Body, RuleMargin, Verdicts, judge
 from dynident.consistency.spread import second_moment
-from dynident.inertia import from_com, margins, to_com
+from dynident.inertia import from_com, margins, point_inertia, to_com
 from dynident.robot.hull import Hull
 
 _UNITS = {
@@ -155,7 +155,7 @@ def _causes_of_spread(body: Body) -> Iterator[str]:
             break
     com = properties.com
     if np.linalg.norm(com) > 1e-3 * body.length:
-        shift = properties.mass * (com @ com * np.eye(3) - np.outer(com, com))
+        shift = properties.mass * point_inertia(com)
         if _holds(body, properties.inertia_com - shift):
             yield "it fits if it was stated about the link's origin, not the centre of mass"
 

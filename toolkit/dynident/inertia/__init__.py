@@ -29,6 +29,7 @@ from dynident.inertia.parameters import (
     frame_change,
     from_com,
     inertia_matrix,
+    point_inertia,
     pseudo_inertia,
     to_com,
 )
@@ -68,6 +69,7 @@ __all__ = [
     "log_cholesky_entries",
     "log_cholesky_jacobian",
     "margins",
+    "point_inertia",
     "pseudo_inertia",
     "reference_body",
     "spatial_inertia_matrix",

@@ -69,6 +69,16 @@ def inertia_matrix(phi: ArrayLike) -> NDArray[np.float64]:
     return matrix
 
 
+def point_inertia(place: ArrayLike) -> NDArray[np.float64]:
+    """Return the (3, 3) inertia about the origin of a unit mass at a place (3,) in m, m^2.
+
+    Of squares of distances from the axes: of a place far along one of them, |place|^2 less the
+    square along it keeps no digit.
+    """
+    from_axes = np.cross(np.eye(3), place)
+    return from_axes @ from_axes.T
+
+
 def from_com(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[np.float64]:
     """Return phi (10,) from mass, centre of mass and inertia about the centre of mass.
 
@@ -82,7 +92,7 @@ def from_com(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[np.
         About the centre of mass, in the frame's axes, kg m^2.
     """
     com = np.asarray(com, dtype=float)
-    shift = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    shift = mass * point_inertia(com)
     about_origin = np.asarray(inertia_com, dtype=float) + shift
     return np.concatenate([[mass], mass * com, about_origin[_ROW, _COLUMN]])
 
@@ -99,7 +109,7 @@ def to_com(phi: ArrayLike) -> MassProperties:
         com = np.zeros(3) if not np.any(moment) else np.full(3, np.nan)
     else:
         com = moment / mass
-    shift = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    shift = mass * point_inertia(com)
     return MassProperties(mass, com, inertia_matrix(phi) - shift)
 
 
@@ -137,7 +147,7 @@ def frame_change(R: ArrayLike, p: ArrayLike) -> NDArray[np.float64]:
     change[1:4, 1:4] = R
     # Inertia about A's origin: R I R' + terms in the rotated first moment h = R h_B and the mass,
     # I_A = R I_B R' + [2 (p.h) E - p h' - h p'] + m [(p.p) E - p p'].
-    change[4:, 0] = (p @ p * np.eye(3) - np.outer(p, p))[_ROW, _COLUMN]
+    change[4:, 0] = point_inertia(p)[_ROW, _COLUMN]
     for k in range(3):
         h = R[:, k]
         cross = 2.0 * (p @ h) * np.eye(3) - np.outer(p, h) - np.outer(h, p)

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from dynident.errors import ConsistencyError
 from dynident.inertia.conversions import from_paper
 from dynident.inertia.margins import margins
-from dynident.inertia.parameters import to_com
+from dynident.inertia.parameters import point_inertia, to_com
 
 VIRTUAL = ("h1", "h2", "h3", "h4", "h5", "h6", "h7", "h8", "h9", "h10", "h11")
 """Names, in the paper's order."""
@@ -98,10 +98,7 @@ def virtual_jacobian(h: ArrayLike) -> NDArray[np.float64]:
     jacobian = np.zeros((11, 11))
     jacobian[0, 0] = 2.0 * root
     jacobian[1:4, 0] = 2.0 * root * com
-    # As squares of distances from the axes: of a centre far along one of them, |com|^2 less the
-    # square along it keeps no digit.
-    from_axes = np.cross(np.eye(3), com)
-    jacobian[4:10, 0] = _six(2.0 * root * (from_axes @ from_axes.T))
+    jacobian[4:10, 0] = _six(2.0 * root * point_inertia(com))
     for k, axis in enumerate(np.eye(3)):
         jacobian[1 + k, 1 + k] = mass
         product = np.outer(axis, com)
