@@ -12,6 +12,7 @@ from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.reporting.headline import headline
+from dynident.reporting.next_steps import next_steps
 from synthetic import arm, synthetic, true_values
 
 ROWS = 800
@@ -113,7 +114,7 @@ def test_few_rows_and_nothing_left_say_nothing() -> None:
     assert not told(left(noise(4)[:50]))
 
 
-def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
+def test_without_a_noise_floor_knocks_are_told_and_are_no_noise() -> None:
     """Its test recording shows none, and its residual is as large as noise might be."""
     model = Model(arm()) + "viscous_friction" + "coulomb_friction"
     values = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
@@ -133,6 +134,10 @@ def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
     assert "; at elbow the " in said[0] and "shoulder" not in said[0]
     assert ": 3 bursts, " in said[0]
     assert found.bursts == ("elbow",)
+    assert found.verdict == "unexplained"
     head = headline(found)
-    assert head.mark != "\u2713"
+    assert (head.mark, head.title) == ("!", "a residual remains")
+    assert "Look at the pictures of elbow" in next_steps(found)[0].what
+    quiet = diagnose(model, Dataset((recorded(0, ()), recorded(1, ()))), propose="never")
+    assert (quiet.verdict, quiet.bursts) == ("nothing_missing", ())
     assert "At elbow a few bursts hold most of what is left" in head.sentence

@@ -248,6 +248,12 @@ class Answer:
             return (
                 f"{added}{left}" if effects else f"{left} No effect in the catalogue explains it."
             )
+        if self.only_bursts:
+            return (
+                "No effect in the catalogue is of use, and what is left at "
+                f"{' and '.join(self.bursts)} is not all noise: a few bursts hold most of it, as "
+                "noise of one size never does. How much of the rest is noise is unknown."
+            )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":
@@ -281,6 +287,12 @@ class Answer:
                 "differs between recordings, or what the catalogue does not have."
             )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    @property
+    def only_bursts(self) -> bool:
+        """Whether bursts are all that speaks for something missing, and no noise floor is known."""
+        alone = self.verdict == "unexplained" and not self.steps and not self.following_motion
+        return alone and bool(self.bursts) and self.noise_source == "unknown"
 
     @property
     def only_withdrawn(self) -> bool:

@@ -109,7 +109,9 @@ def assemble(
     trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
     names, units = given.robot.names, given.robot.torque_units
     bursts = bursts_in(trained, names, units, evidence.criteria.verdict)
-    verdict = verdict_of(before, after, trained, steps, rounds[-1], evidence.criteria.verdict)
+    verdict = verdict_of(
+        before, after, trained, steps, rounds[-1], evidence.criteria.verdict, bursts
+    )
     final = estimate_of(evidence, stages[-1], train)
     impossible = ()
     if verdict != "unexplained":

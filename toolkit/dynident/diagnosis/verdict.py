@@ -29,6 +29,7 @@ def verdict_of(
     steps: Sequence[Step],
     last: Ranking,
     criteria: VerdictCriteria,
+    bursts: Collection[str] = (),
 ) -> Verdict:
     """Return the verdict on a search, from what it leaves and its last ranking.
 
@@ -40,9 +41,11 @@ def verdict_of(
     steps : the effects added.
     last : the last ranking.
     criteria : of the verdict.
+    bursts : joints at which a few instants hold most of what the final model leaves. No size of
+        noise makes them, so that of a model without a step they say that something is missing.
     """
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
-        if last.passing:
+        if last.passing or (bursts and not steps):
             return "unexplained"
         return "explained" if steps else "nothing_missing"
     if beyond_noise(trained, criteria).any():

@@ -51,7 +51,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
     elif diagnosis.verdict == "unexplained" and (
-        diagnosis.noise_source != "unknown" or diagnosis.following_motion
+        diagnosis.noise_source != "unknown" or diagnosis.following_motion or diagnosis.only_bursts
     ):
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source == "unknown":
@@ -311,7 +311,7 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
             "which training recording it is largest, and when.",
         )
     worst = [one.joint.name for one in states(diagnosis) if one.state == "failing"]
-    worst = worst or list(diagnosis.following_motion)
+    worst = worst or list(diagnosis.following_motion or diagnosis.bursts)
     where = listed(worst[:3]) or "the joints"
     explained = "that no effect of the catalogue explains"
     if diagnosis.only_withdrawn:
