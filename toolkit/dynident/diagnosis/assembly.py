@@ -107,11 +107,9 @@ def assemble(
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
     trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
-    names, units = given.robot.names, given.robot.torque_units
-    bursts = bursts_in(trained, names, units, evidence.criteria.verdict)
-    verdict = verdict_of(
-        before, after, trained, steps, rounds[-1], evidence.criteria.verdict, bursts
-    )
+    names, units, judging = given.robot.names, given.robot.torque_units, evidence.criteria.verdict
+    bursts = bursts_in(trained, names, units, judging)
+    verdict = verdict_of(before, after, trained, steps, rounds[-1], judging, bursts)
     final = estimate_of(evidence, stages[-1], train)
     impossible = ()
     if verdict != "unexplained":
@@ -119,7 +117,7 @@ def assemble(
         verdict = "unexplained" if impossible else verdict
     limits = _limits(search, held, trained) if verdict == "nothing_missing" else ()
     # Where a law is missing, a delay may be no more than a part of it.
-    most_of_it = evidence.criteria.verdict.most_explained if verdict == "unexplained" else 0.0
+    most_of_it = judging.most_explained if verdict == "unexplained" else 0.0
     pushed = contact_candidates(given, evidence, search.disturbances)
     gains, last_gains = _gains(search, held, before.error, after.error)
     first = _merged(_candidates(rounds[0], gains), pushed)
@@ -141,7 +139,7 @@ def assemble(
             *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),
             *burst_notes(bursts),
-            *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
+            *rounding_notes(after, given.robot.names, judging),
             *notes_on_steps(steps, held),
             *unseen_notes(evidence, stages[-1], tuple(step.effect.label for step in steps)),
             *path.notes,

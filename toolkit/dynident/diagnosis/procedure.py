@@ -125,7 +125,7 @@ def diagnose(
     FitError
         If there is no recording.
     RecordingError
-        If a recording is too short, or does not repeat with its period.
+        If a recording is too short, does not repeat with its period, or lacks a joint.
     """
     if not train.recordings:
         raise FitError("no recording to diagnose", remedy='mark some recordings use = "train"')
@@ -133,7 +133,8 @@ def diagnose(
     if most is None:
         per_joint = criteria.search.most_effects_per_joint * given.robot.n
         most = max(criteria.search.most_effects, per_joint)
-    train, *others = numbered(train, *([] if test is None else [test]))
+    both = (train,) if test is None else (train, test)
+    train, *others = numbered(*(one.of_joints(given.robot.names) for one in both))
     progress = progress or logged("diagnosing")
     progress("checking the wiring")
     held_out = others[0] if others else None

@@ -166,6 +166,7 @@ def compare(
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
+    dataset = dataset.of_joints(next(iter(named.values())).robot.names)
     standing = {joint for one in named.values() for joint in one.standing}
     dataset = without_stops([one.model for one in named.values()], dataset, standing)
     runs = gather(dataset, criteria.noise)
@@ -209,7 +210,9 @@ def compare_models(
     -------
     As `compare`, of the fitted models.
     """
-    wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
+    first = next(iter(models.values()))
+    train, test = (one.of_joints(first.robot.names) for one in (train, test))
+    wiring = check_wiring(first, train, test, criteria.wiring)
     train = without_stops(models.values(), train)
     test = without_stops(models.values(), test, standing_in(train))
     runs = gather(train, criteria.noise)

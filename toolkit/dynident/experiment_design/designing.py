@@ -71,6 +71,7 @@ def design(
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
     limits.require_ranges(model.robot)
+    recorded = recorded.of_joints(model.robot.names)
     loads = tuple(dict.fromkeys(task.loads))
     if len(loads) < 2:
         return _designed(model, recorded, task, limits, progress)

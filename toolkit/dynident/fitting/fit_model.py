@@ -68,7 +68,8 @@ def fit(
     Parameters
     ----------
     model : the robot and its effects.
-    data : recordings with their filter; a single recording takes the default filter.
+    data : recordings with their filter; a single recording takes the default filter. Their joints
+        are those of the robot by their names, in any order.
     method : an estimator: `LeastSquares`, `Constrained`, `IV`, `Regression`, or any other class
         with their `fit`; default: least squares, weighted per joint.
     client : of dask.distributed, whose workers make the passes of least squares over recordings:
@@ -84,10 +85,11 @@ def fit(
     FitError
         If the data cannot carry the model, memory does not suffice, or the cluster fails.
     RecordingError
-        If a recording does not suit its filter.
+        If a recording does not suit its filter, or has not every joint of the robot.
     """
     try:
         dataset = Dataset((data,)) if isinstance(data, Recording) else data
+        dataset = dataset.of_joints(model.robot.names)
         with working_on(client):
             return _fitted(model, dataset, method or LeastSquares())
     except MemoryError:

@@ -177,11 +177,16 @@ class Problem:
         return max(0.0, float(-np.linalg.eigvalsh(self.body_matrices(x)).min(initial=0.0)))
 
     def violation(self, x: np.ndarray) -> float:
-        """How far x breaks a linear or second-order constraint, relative to sizes; 0 inside."""
+        """How far x breaks a linear or second-order constraint, relative to sizes; 0 inside.
+
+        To the value itself where that is larger than its size, of which a solver has no more
+        digits: the size of what is known well is small.
+        """
         worst, linear = 0.0, self.linear
         if len(linear.A):
             value = linear.A @ x
-            worst = max(worst, *(linear.lower - value), *(value - linear.upper))
+            broken = np.maximum(linear.lower - value, value - linear.upper)
+            worst = max(worst, *(broken / np.maximum(np.abs(value), 1.0)))
         for value in self.cone_values(x):
             worst = max(worst, float(np.linalg.norm(value[1:]) - value[0]))
         return float(worst)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -73,6 +74,27 @@ class Dataset:
 
     def __len__(self) -> int:
         return len(self.recordings)
+
+    def of_joints(self, joints: Sequence[str]) -> Dataset:
+        """Return the recordings of these joints, in this order, which is that of a model's torques.
+
+        Raises
+        ------
+        RecordingError
+            If a recording has not all of them.
+        """
+        names = self.recordings[0].joints if self.recordings else tuple(joints)
+        if names == tuple(joints):
+            return self
+        if missing := [joint for joint in joints if joint not in names]:
+            raise RecordingError(
+                f"no joint '{missing[0]}', which the robot has; joints: {', '.join(names)}",
+                self.recordings[0].where,
+                "name the recording's joints as the robot's are: recording.replace(joints=...)",
+            )
+        picked = [names.index(joint) for joint in joints]
+        noise = self.noise and Noise(self.noise.position_std[picked], self.noise.torque_std[picked])
+        return Dataset(tuple(one.select(joints) for one in self.recordings), self.filter, noise)
 
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""

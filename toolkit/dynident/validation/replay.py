@@ -69,6 +69,7 @@ def validate(
         If no recording has a reference, or the controller cannot be simulated or is another
         robot's. A loop that cannot be simulated is no error: see `Validation.skipped`.
     """
+    dataset = dataset.of_joints(estimate.robot.names)
     return simulate_again(Judged.of(estimate), dataset, controller, criteria.loops, progress)
 
 
