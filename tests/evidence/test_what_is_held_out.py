@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynident import diagnose, fit
+from dynident import compare, diagnose, fit, read, write
 from dynident.evidence import compare_models
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -46,3 +46,21 @@ def test_a_rank_without_a_gap_has_no_infinite_one(runs) -> None:
     none = replace(basis, diagonal=np.array(basis.diagonal[: basis.rank]))
     said = replace(whole, basis=none).summary()
     assert "inf" not in said and f"{basis.rank} of {MODEL.size + 1} parameters identified" in said
+
+
+def test_recordings_that_a_fit_has_seen_are_not_called_held_out(runs, tmp_path) -> None:
+    """The same rows of a file; another window of it is other data."""
+    first, other = (
+        write(run, tmp_path / f"run{k}.csv") and read(tmp_path / f"run{k}.csv")
+        for k, run in enumerate(runs)
+    )
+    middle = (first.t[0] + first.t[-1]) / 2
+    found = fit(MODEL, Dataset((first.replace(window=(first.t[0], middle)),)))
+    same = compare(found, Dataset((first.replace(window=(first.t[0], middle)), other)))
+    assert same.fitted_to == (first.name,)
+    table, *_ = same.tables()
+    assert isinstance(table, Table) and table.title == "Relative torque error on recordings"
+    assert any(f"Fitted to: {first.name}" in note for note in table.notes)
+    for fresh in (first.replace(window=(middle, first.t[-1])), other):
+        table, *_ = compare(found, Dataset((fresh,))).tables()
+        assert isinstance(table, Table) and "held-out" in table.title

@@ -7,6 +7,7 @@ import pytest
 
 import two_link_loop as lab
 from dynident import IV, Constrained, Regression
+from dynident.errors import RecordingError
 from dynident.fitting import Estimate, LeastSquares, Method, SwappedPeriods, fit, load_estimate
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
 from dynident.recording import Dataset, Filter, suited_filter
@@ -92,3 +93,10 @@ def test_columns_that_are_alike_but_for_rounding_have_a_wider_covariance_too() -
     one = np.outer(along, along) - 1e-17 * np.outer(across, across)
     wider = widened(one, 4.0 * one)
     np.testing.assert_allclose(wider, 4.0 * one, rtol=1e-6, atol=1e-9)
+
+
+def test_a_period_with_which_nothing_repeats_is_refused_by_a_fit_too() -> None:
+    (one,) = repeated().recordings
+    assert one.period is not None
+    with pytest.raises(RecordingError, match="do not repeat with the given period"):
+        fit(lab.model(), one.replace(period=0.7 * one.period))

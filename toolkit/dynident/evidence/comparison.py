@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
+from dynident.fitting.least_squares import sources_of
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.uncertainty.standing_joints import standing_in, standing_note, without_stops
 from dynident.model import Model
@@ -42,6 +43,7 @@ class Comparison(Shown):
     wiring : columns and data that are not what the study says, where that was checked.
     standing : joints that stand, and how many of their rows therefore do not count; empty for
         none.
+    fitted_to : recordings that an estimate was fitted to: there is no held-out error of these.
     """
 
     names: tuple[str, ...]
@@ -51,6 +53,7 @@ class Comparison(Shown):
     criteria: Criteria = DEFAULTS
     wiring: tuple[Fault, ...] = ()
     standing: str = ""
+    fitted_to: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
@@ -85,6 +88,15 @@ class Comparison(Shown):
         }
 
     @property
+    def _seen_before(self) -> str:
+        if not self.fitted_to:
+            return ""
+        return (
+            f"Fitted to: {', '.join(self.fitted_to)}. Of what a fit has seen the error is smaller "
+            "than of another motion."
+        )
+
+    @property
     def _loops(self) -> tuple[Loop, ...]:
         return self.loops or (None,) * len(self.names)
 
@@ -105,13 +117,14 @@ class Comparison(Shown):
         notes = (
             *notes,
             *mostly_noise(robot.names, shares),
-            *filter(None, (self.standing,)),
+            *filter(None, (self.standing, self._seen_before)),
             *(f"Wiring: {fault.sentence}" for fault in self.wiring),
         )
         alone = len(self.names) == 1
         named = ("torque error",) if alone else (f"error, {name}" for name in self.names)
         columns = ("joint", *named, "noise floor")
-        title = f"Relative torque error on held-out {last.what}"
+        held_out = "" if self.fitted_to else "held-out "
+        title = f"Relative torque error on {held_out}{last.what}"
         errors = Table(title, columns, tuple(rows), notes)
         loops = loop_table(self.names, self._loops, robot.names)
         if loops and alone:
@@ -183,7 +196,14 @@ def compare(
         ),
         criteria=criteria,
         standing=standing_note(dataset),
+        fitted_to=_fitted_to(named.values(), dataset),
     )
+
+
+def _fitted_to(estimates: Collection[Estimate], dataset: Dataset) -> tuple[str, ...]:
+    """Recordings that one of the estimates rests on: the same rows of a file, filtered alike."""
+    known = {source for one in estimates for source in one.sources if source.sha256}
+    return tuple(source.file for source in sources_of(dataset) if source in known)
 
 
 @single_threaded

@@ -64,8 +64,9 @@ def _in_words(width: float, interval: tuple[float, float], unit: str, says: str)
     """What is known of a width."""
     low, high = interval
     if low > 0 and np.isfinite(high):
-        between = f"95 % interval {number(low, 2)} to {number(high, 2)}"
-        return f"{number(width, 2)} {unit} ({between}; {says})"
+        digits = 2 if number(low, 2) != number(high, 2) else 3
+        between = f"95 % interval {number(low, digits)} to {number(high, digits)}"
+        return f"{number(width, digits)} {unit} ({between}; {says})"
     if low > 0:
         return f"at least {number(low, 2)} {unit} ({says})"
     if np.isfinite(high):

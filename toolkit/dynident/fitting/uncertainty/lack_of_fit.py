@@ -20,7 +20,15 @@ from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.model import Model
-from dynident.recording import Dataset, Filter, Recording, periods
+from dynident.recording import (
+    Dataset,
+    Filter,
+    Recording,
+    as_points,
+    periods,
+    require_repetition,
+    turning_round,
+)
 from dynident.tables import number
 
 _REJECTED = 4.0
@@ -66,7 +74,8 @@ class LackOfFit:
         return (
             "The model is rejected by the repetitions of its motion: what they have in common in "
             f"the residual is no noise, {', '.join(parts)}. Parameters may be off by more than "
-            "sigma says."
+            "sigma says. What is missing, or whether dry friction only reverses over another width "
+            "than is stated, `dynident explain` tells."
         )
 
 
@@ -81,6 +90,11 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     Returns
     -------
     The comparison; None where no recording repeats often enough.
+
+    Raises
+    ------
+    RecordingError
+        If the positions do not repeat with a recording's period.
     """
     if not any(recording.period for recording in dataset.recordings):
         return None
@@ -104,13 +118,18 @@ def _of_recording(
     """What `_apart` says of a recording; None where it does not repeat."""
     if not recording.period:
         return None
-    sampled = sample(recording, settings)
+    sampled, folded = sample(recording, settings), None
     left = np.concatenate([one for one, _ in sampled.residuals(model, values)])
     # Less than two periods tell nothing, and are no mistake here.
     with suppress(RecordingError):
         folded = periods(len(left), sampled.rate_hz, recording.period, recording.where)
-        return _apart(folded.fold(left), folded.fold(sampled.counting))
-    return None
+    if folded is None:
+        return None
+    even = sampled.recording
+    positions = even.q[np.searchsorted(even.t, sampled.t)]
+    points = as_points(positions, turning_round(even))
+    require_repetition(points, folded, recording.where)
+    return _apart(folded.fold(left), folded.fold(sampled.counting))
 
 
 def scattered(
