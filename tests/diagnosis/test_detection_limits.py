@@ -7,6 +7,7 @@ import pytest
 
 from dynident import diagnose
 from dynident.diagnosis import Diagnosis
+from dynident.diagnosis.detection_limits import limit_table
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values
@@ -79,6 +80,19 @@ def test_every_effect_that_can_be_shown_has_a_limit_in_words_and_in_json(
     table = next(one for one in healthy.tables() if "would have been found" in str(one))
     assert "Nothing larger was detected than" in str(table)
     assert "N m at shoulder" in " ".join(str(table).split())
+
+
+def test_the_limit_at_a_joint_is_of_effects_there(healthy: Diagnosis) -> None:
+    """What an elastic shoulder makes at the elbow is no limit of an elastic elbow."""
+    for one in healthy.detection_limits:
+        assert one.effect.joint in (None, one.at)
+    table = limit_table(healthy.detection_limits)
+    assert table.title.startswith("What would have been found: torque (rms, N m)")
+    assert table.columns == ("effect", "shoulder", "elbow")
+    here = [one for one in healthy.detection_limits if one.effect.label != "joint_spring@elbow"]
+    (row,) = (row for row in limit_table(tuple(here)).rows if row[0] == "joint spring")
+    assert row[2] == "-" != row[1]
+    assert any(note.startswith("A dash") for note in limit_table(tuple(here)).notes)
 
 
 def test_where_something_is_missing_no_limit_is_stated() -> None:

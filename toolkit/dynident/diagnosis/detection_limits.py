@@ -65,7 +65,8 @@ def detection_limits(
 
     Returns
     -------
-    One for each effect that the data can show and each joint at which it acts.
+    One for each effect that the data can show: of an effect at a joint, of the torque there; of one
+    of the whole robot, at each joint at which it acts.
     """
     robot, found = fitted.model.robot, []
     beside_steps = _deviations_beside_steps(trained, fitted)
@@ -81,8 +82,10 @@ def detection_limits(
         ):
             largest = float(np.linalg.eigvals(one.covariance @ squares).real.max())
             torque = max(deviations, beside_steps[joint]) * np.sqrt(max(largest, 0.0))
-            if np.isfinite(torque) and torque > 0:
-                name, unit = robot.names[joint], robot.torque_units[joint]
+            name, unit = robot.names[joint], robot.torque_units[joint]
+            # What an effect at another joint makes here is no limit of one that is here.
+            elsewhere = one.effect.joint not in (None, name)
+            if np.isfinite(torque) and torque > 0 and not elsewhere:
                 found.append(
                     DetectionLimit(effect=one.effect, at=name, torque_rms=torque, torque_unit=unit)
                 )
@@ -161,12 +164,18 @@ def limit_table(limits: tuple[DetectionLimit, ...]) -> Table:
         (name.replace("_", " "), *(number(at.get(joint), 2) for joint in joints))
         for name, at in sorted(kinds.items())
     )
+    units = {joint: _unit(limits, joint) for joint in joints}
+    shared, columns = "", tuple(f"{joint}, {unit}" for joint, unit in units.items())
+    if len(set(units.values())) == 1:
+        shared, columns = f", {units[joints[0]]}", joints
+    dashes = any(set(joints) - set(at) for at in kinds.values())
     return Table(
-        "What would have been found: torque (rms) from which each effect passes the gates",
-        ("effect", *(f"{joint}, {_unit(limits, joint)}" for joint in joints)),
+        f"What would have been found: torque (rms{shared}) from which each effect passes the gates",
+        ("effect", *columns),
         rows,
         (
             largest_in_words(limits),
+            *(("A dash: not looked for there, or nothing that this motion could show.",) * dashes),
             "Along the recorded motion: others show less or more of an effect. The noise of a "
             "single recording moves a limit by up to a third.",
         ),
