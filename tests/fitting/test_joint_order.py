@@ -34,15 +34,15 @@ def test_the_order_of_a_recordings_joints_changes_nothing() -> None:
     np.testing.assert_array_equal(fit.values, other.values)
     np.testing.assert_array_equal(fit.sigma, other.sigma)
     errors = [di.compare(fit, data).results[0].joint_errors for data in (test, turned(test))]
-    np.testing.assert_array_equal(*errors)
+    np.testing.assert_array_equal(errors[0], errors[1])
     found = [
         di.diagnose(MODEL, *data, most=0, propose="never").test_error
         for data in ((train, test), (turned(train), turned(test)))
     ]
     assert found[0] == found[1]
-    np.testing.assert_array_equal(
-        turned(train).of_joints(MODEL.robot.names).noise.torque_std, [0.1, 0.2]
-    )
+    back = turned(train).of_joints(MODEL.robot.names).noise
+    assert back is not None
+    np.testing.assert_array_equal(back.torque_std, [0.1, 0.2])
 
 
 def test_a_joint_beside_those_of_the_robot_is_left_out() -> None:
@@ -71,3 +71,18 @@ def test_joints_of_other_names_are_refused(use) -> None:
         match=r"no joint 'shoulder', which the robot has; joints: axis1, elbow.*replace\(joints",
     ):
         use(MODEL, strange)
+
+
+def test_a_single_recording_is_data_enough() -> None:
+    (train,), (test,) = recorded(5).recordings, recorded(6).recordings
+    fit = di.fit(MODEL, train)
+    assert (
+        di.compare(fit, test).results[0].error == di.compare(fit, Dataset((test,))).results[0].error
+    )
+    found = di.diagnose(fit, train, test, most=0, propose="never")
+    assert (
+        found.test_error
+        == di.diagnose(
+            MODEL, Dataset((train,)), Dataset((test,)), most=0, propose="never"
+        ).test_error
+    )

@@ -99,7 +99,7 @@ def test_a_joint_that_is_too_fast_comes_first():
 
 def test_that_the_catalogue_lacks_it_is_not_said_of_what_was_withdrawn():
     found = of_kind("unexplained", False, noise=True)
-    assert "no effect in the catalogue takes it away" in found.sentence
+    assert "no effect in the catalogue was seen to take it away" in found.sentence
     assert "no effect of the catalogue explains it" in headline(found).sentence
     taken = Withdrawn(effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=())
     one = replace(found, withdrawn=(taken,))

@@ -13,7 +13,6 @@ from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import progress
 from dynident.cli.work import STUDY, load_study, require_picture, require_places, with_drives
-from dynident.errors import warn
 
 if TYPE_CHECKING:
     from dynident.fitting import Estimate, Method
@@ -49,11 +48,6 @@ class _Files:
             estimate.save(self.out)
         if self.robot:
             estimate.write_robot(self.robot)
-            broken = estimate.inconsistent_links()
-            if broken:
-                what = f"{self.robot}: no rigid body can have the parameters of {', '.join(broken)}"
-                left = "What the data cannot tell was left as given; --consistency full fits others"
-                warn(f"{what}. {left}")
         if self.plot is not None and estimate.history is not None:
             from dynident.reporting.pictures.convergence import convergence
             from dynident.reporting.pictures.plots import save

@@ -40,7 +40,7 @@ _VERDICTS: dict[Verdict, str] = {
     "nothing_missing": "Nothing is missing: what remains is within the noise.",
     "explained": "Explained: {effects} added, and what remains is within the noise.",
     "unexplained": "None of these explains it: a residual beyond the noise remains, and no effect "
-    "in the catalogue takes it away.",
+    "in the catalogue was seen to take it away.",
 }
 
 _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {

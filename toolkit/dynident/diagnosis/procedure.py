@@ -75,7 +75,7 @@ from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.progress import logged
-from dynident.recording import Dataset, numbered
+from dynident.recording import Dataset, Recording, numbered
 from dynident.threads import single_threaded
 from dynident.wiring import check_wiring
 
@@ -84,8 +84,8 @@ from dynident.wiring import check_wiring
 @single_threaded
 def diagnose(
     model: Model | Estimate,
-    train: Dataset,
-    test: Dataset | None = None,
+    train: Dataset | Recording,
+    test: Dataset | Recording | None = None,
     *,
     controller: Controller | None = None,
     most: int | None = None,
@@ -100,7 +100,7 @@ def diagnose(
     ----------
     model : the model as given (or an estimate of it: it is fitted anew, with instruments where
         the motion repeats).
-    train : recordings to fit.
+    train : recordings to fit; a single one takes the default filter.
     test : recordings to judge by; without any, blocks of the training recordings are held out.
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.
@@ -127,14 +127,14 @@ def diagnose(
     RecordingError
         If a recording is too short, does not repeat with its period, or lacks a joint.
     """
+    given = model.model if isinstance(model, Estimate) else model
+    every = (train,) if test is None else (train, test)
+    train, *others = numbered(*(Dataset.of(one, given.robot.names) for one in every))
     if not train.recordings:
         raise FitError("no recording to diagnose", remedy='mark some recordings use = "train"')
-    given = model.model if isinstance(model, Estimate) else model
     if most is None:
         per_joint = criteria.search.most_effects_per_joint * given.robot.n
         most = max(criteria.search.most_effects, per_joint)
-    both = (train,) if test is None else (train, test)
-    train, *others = numbered(*(one.of_joints(given.robot.names) for one in both))
     progress = progress or logged("diagnosing")
     progress("checking the wiring")
     held_out = others[0] if others else None

@@ -20,7 +20,7 @@ from dynident.fitting.least_squares import sources_of
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.uncertainty.standing_joints import standing_in, standing_note, without_stops
 from dynident.model import Model
-from dynident.recording import Dataset
+from dynident.recording import Dataset, Recording
 from dynident.tables import Shown, Table, finite, mostly_noise, percent
 from dynident.threads import single_threaded
 from dynident.validation.replay import Judged, loop_of
@@ -150,7 +150,7 @@ class Comparison(Shown):
 @single_threaded
 def compare(
     estimates: Estimate | Mapping[str, Estimate],
-    dataset: Dataset,
+    dataset: Dataset | Recording,
     controller: Controller | None = None,
     criteria: Criteria = DEFAULTS,
 ) -> Comparison:
@@ -159,7 +159,8 @@ def compare(
     Parameters
     ----------
     estimates : one, or several by name.
-    dataset : recordings, with their filter and, where nothing repeats, their noise.
+    dataset : recordings, with their filter and, where nothing repeats, their noise; a single one
+        takes the default filter.
     controller : of the loop in which they were made: each estimate is simulated in it, too, where
         recordings have their reference.
     criteria : of the noise, of loops and of what residual maps show.
@@ -176,10 +177,10 @@ def compare(
     named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
     if not named:
         raise FitError("no estimate to compare", remedy="give one, or several by their names")
+    dataset = Dataset.of(dataset, next(iter(named.values())).robot.names)
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
-    dataset = dataset.of_joints(next(iter(named.values())).robot.names)
     standing = {joint for one in named.values() for joint in one.standing}
     dataset = without_stops([one.model for one in named.values()], dataset, standing)
     runs = gather(dataset, criteria.noise)

@@ -22,6 +22,7 @@ from dynident.experiment_design.motions.spline_motions import SplineMotions
 from dynident.experiment_design.predicted_torque import WRONG
 from dynident.experiment_design.recording_design import LoadTried, RecordingDesign
 from dynident.experiment_design.telling.separation import Separation, times_until
+from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.progress import logged
 from dynident.recording import Dataset
@@ -37,7 +38,7 @@ _HOPELESS = 0.01  # standard deviations with the best usual motion: told by none
 @checked
 @single_threaded
 def design(
-    model: Model,
+    model: Model | Estimate,
     recorded: Dataset,
     task: DesignTask | None = None,
     *,
@@ -51,7 +52,7 @@ def design(
 
     Parameters
     ----------
-    model : the robot and its effects.
+    model : the robot and its effects, or an estimate of it.
     recorded : recordings so far, with their filter.
     task : what for; default: all parameters.
     limits : of the motion; default: nine tenths of the description's.
@@ -67,6 +68,7 @@ def design(
         If no motion within the limits can be found, an effect depends on the past, or nothing that
         the robot can do shows what is asked.
     """
+    model = model.model if isinstance(model, Estimate) else model
     task = task or DesignTask()
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynident import files
 from dynident.arguments import checked
-from dynident.errors import FitError
+from dynident.errors import FitError, warn
 from dynident.fitting.estimate_schema import FORMAT, basis_part, model_part
 from dynident.fitting.history import Convergence
 from dynident.inertia import margins
@@ -346,8 +346,18 @@ class Estimate(Shown):
         ------
         RobotError
             If the format cannot hold the parameters (a massless link with a first moment, say).
+
+        Warns
+        -----
+        DynidentWarning
+            If no rigid body can have the parameters of a link.
         """
-        return write(self.robot, path)
+        written = write(self.robot, path)
+        if broken := self.inconsistent_links():
+            what = f"{path}: no rigid body can have the parameters of {', '.join(broken)}"
+            left = "What the data cannot tell was left as given"
+            warn(f"{what}. {left}; --consistency full (`Constrained` in Python) fits others")
+        return written
 
     def inconsistent_links(self) -> tuple[str, ...]:
         """Moving links of `robot` whose inertial parameters no rigid body can have."""

@@ -88,8 +88,7 @@ def fit(
         If a recording does not suit its filter, or has not every joint of the robot.
     """
     try:
-        dataset = Dataset((data,)) if isinstance(data, Recording) else data
-        dataset = dataset.of_joints(model.robot.names)
+        dataset = Dataset.of(data, model.robot.names)
         with working_on(client):
             return _fitted(model, dataset, method or LeastSquares())
     except MemoryError:

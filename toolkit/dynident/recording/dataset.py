@@ -75,6 +75,18 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.recordings)
 
+    @staticmethod
+    def of(data: Dataset | Recording, joints: Sequence[str]) -> Dataset:
+        """Return data as recordings of these joints; a single one takes the default filter.
+
+        Raises
+        ------
+        RecordingError
+            As `of_joints`.
+        """
+        dataset = Dataset((data,)) if isinstance(data, Recording) else data
+        return dataset.of_joints(joints)
+
     def of_joints(self, joints: Sequence[str]) -> Dataset:
         """Return the recordings of these joints, in this order, which is that of a model's torques.
 
