@@ -137,7 +137,7 @@ CALLS: dict[str, str] = {
     "di.diagnose(study)": "diagnose: missing a required argument: 'train'",
     "di.diagnose(fit, di.Dataset(()))": "no recording to diagnose. mark some",
     "di.diagnose(study, train)": "diagnose: model is a Study. give a Model or an Estimate",
-    "di.diagnose(fit, train, 'test.csv')": "diagnose: test = 'test.csv'. give a Dataset or a Recording or None",
+    "di.diagnose(fit, train, 'test.csv')": "diagnose: test = 'test.csv'. give a Dataset or a",
     "di.diagnose(fit, train, most='all')": "diagnose: most = 'all'. give a whole number or None",
     "di.diagnose(fit, train, most=1.5)": "diagnose: most = 1.5. give a whole number or None",
     "di.diagnose(fit, train, propose='maybe')": "DiagnosisTask: propose = 'maybe'. give",
