@@ -1,71 +1,106 @@
-"""What Python prints of results, and how it warns: to be read at a prompt and in a notebook."""
+"""Results in notebooks: the same tables and sentences as in a terminal, never a dump of fields."""
 
 from __future__ import annotations
 
-import re
-import sys
-import warnings
-from importlib import import_module
-from pathlib import Path
+import math
 
-import numpy as np
 import pytest
 
 import dynident as di
-from dynident.errors import DynidentWarning, warn, without_warnings
-from dynident.recording import Dataset, Recording
-from dynident.tables import Shown
-from synthetic import arm, smooth_motion
+from dynident.tables import (
+    MOSTLY_NOISE,
+    WIDTH,
+    Table,
+    mostly_noise,
+    print_tables,
+    relative,
+    two_percent,
+)
+from study_files import recording, true_model
 
 
-def _every_kind(kind: type) -> list[type]:
-    return [one for each in kind.__subclasses__() for one in (each, *_every_kind(each))]
+def test_results_are_tables_in_a_notebook() -> None:
+    fit = di.fit(true_model(), recording(1))
+    compared = di.compare(fit, di.Dataset((recording(2),)))
+    for one in (fit, compared):
+        page = one._repr_html_()
+        tables = [part for part in one.tables() if isinstance(part, Table)]
+        assert page.count("<table") == len(tables) > 0
+        assert "Recording(" not in page and "shoulder" in page
 
 
-def test_what_can_be_shown_is_printed_as_its_tables():
-    for file in Path(di.__path__[0]).rglob("*.py"):
-        if re.search(r"\bShown\b", file.read_text()):
-            inside = file.relative_to(di.__path__[0]).with_suffix("").parts
-            import_module(".".join(("dynident", *inside)))
-    every = _every_kind(Shown)
-    assert {"Diagnosis", "Estimate", "Comparison", "Check"} <= {kind.__name__ for kind in every}
-    for kind in every:
-        assert kind.__repr__ is Shown.__repr__ and kind.__str__ is object.__str__, kind
+def test_sentences_are_escaped() -> None:
+    class Odd(di.Estimate):
+        def tables(self) -> tuple[Table | str, ...]:
+            return ("<b>1 < 2</b>",)
+
+    assert Odd.__new__(Odd)._repr_html_() == "<p>&lt;b&gt;1 &lt; 2&lt;/b&gt;</p>"
 
 
-def _jittered(seed: int = 0) -> Recording:
-    t, q, _, _ = smooth_motion(2, seed, 200.0, 10.0, 5.0)
-    t = t.copy()
-    t[1:-1] += np.random.default_rng(seed).uniform(-1e-3, 1e-3, len(t) - 2)
-    tau = np.random.default_rng(seed).normal(size=q.shape)
-    return Recording(t, q, tau, ("shoulder", "elbow"), name=f"jittered {seed}")
+def test_joints_of_noise_are_marked_and_no_others() -> None:
+    assert mostly_noise(["a", "b", "c"], [None, 0.9 * MOSTLY_NOISE, 0.01]) == ()
+    (note,) = mostly_noise(["a", "b", "c"], [None, 1.1 * MOSTLY_NOISE, 0.01])
+    assert "At b noise" in note
 
 
-def test_a_recording_is_warned_of_once_at_the_line_of_the_user():
-    model = di.Model(arm()) + "viscous_friction"
-    data = Dataset((_jittered(0), _jittered(1)))
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        fit = di.fit(model, data)
-        di.compare(fit, data)
-        print(fit.summary(), file=sys.stderr)
-    ours = [one for one in said if one.category is DynidentWarning]
-    assert sorted(str(one.message).split(":")[0] for one in ours) == ["jittered 0", "jittered 1"]
-    assert {one.filename for one in ours} == {__file__}
+def test_a_fit_that_leaves_much_says_what_to_do() -> None:
+    one = recording(1)
+    poor = di.fit(di.Model(true_model().robot), one)
+    assert max(poor.joint_errors) > 0.2
+    assert "dynident explain" in str(poor.error_table())
+    assert "dynident explain" not in str(di.fit(true_model(), one).error_table())
 
 
-def test_nothing_is_said_of_what_is_only_tried():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with without_warnings():
-            assert not warn("tried")
-        with pytest.raises(DynidentWarning, match="meant"):
-            warn("meant")
+def test_names_never_command_a_terminal(capsys) -> None:
+    Table("a\x1b[31m", ("b\u202e",), (("c\x07",),), ("d\x9b",)).show()
+    said = capsys.readouterr().out
+    assert "a\\u001b[31m" in said and "c\\u0007" in said
+    assert not {"\x1b", "\u202e", "\x07", "\x9b"} & set(said)
 
 
-def test_a_study_prints_its_effects_and_recordings_in_a_few_lines():
-    model = di.Model(arm()) + "coulomb_friction"
-    data = Dataset((_jittered(2),))
-    assert "coulomb_friction@shoulder, coulomb_friction@elbow" in repr(model)
-    assert "jittered 2" in repr(data)
-    assert len(repr(model)) < 250 and len(repr(data)) < 250
+def test_a_table_without_rows_says_none_instead_of_showing_its_headings() -> None:
+    empty = Table("Effects added", ("effect added", "after"), (), ("A note.",))
+    assert str(empty).split("\n")[:2] == ["Effects added: none", "  A note."]
+    assert empty._repr_html_() == "<p>Effects added: none</p><p>A note.</p>"
+
+
+def test_words_of_headings_stay_whole_where_there_is_room() -> None:
+    few = Table("few", ("joint", *["acceleration and load"] * 6), (("j", *["(0 ± 0)"] * 6),))
+    assert str(few).count("acceleration") == 6
+    # Where there is none, they are broken, and every column is there.
+    many = Table("many", ("joint", *["joint_elasticity@shoulder"] * 7), (("j", *"1234567"),))
+    assert all(digit in str(many) for digit in "1234567")
+
+
+def test_what_is_typed_is_not_broken_where_a_line_ends(capsys: pytest.CaptureFixture) -> None:
+    command = "dynident add study.toml " + " ".join(f"torque_offset@joint{k}" for k in range(9))
+    print_tables(f"Next: {'long ' * 40}\n    {command}")
+    lines = capsys.readouterr().out.splitlines()
+    assert f"    {command}" in lines and max(map(len, lines[:-1])) <= WIDTH
+
+
+@pytest.mark.parametrize(
+    ("value", "spread", "said"),
+    [
+        (-2.0, 0.5, "25.0 %"),
+        (2.0, 2.0, "100.0 %"),
+        (1e-9, 1.0, "> 100 %"),
+        (0.0, 1.0, "-"),
+        (math.nan, 1.0, "-"),
+        (1.0, math.inf, "-"),
+    ],
+)
+def test_a_spread_beyond_its_value_has_no_figure(value: float, spread: float, said: str) -> None:
+    assert relative(value, spread) == said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "shown"),
+    [
+        (0.05, 0.04, ("5.00 %", "4.00 %")),
+        (0.00601, 0.00597, ("0.601 %", "0.597 %")),
+        (0.006, 0.006, ("0.60 %", "0.60 %")),
+    ],
+)
+def test_two_errors_have_as_many_digits_as_tell_them_apart(before, after, shown) -> None:
+    assert two_percent(before, after) == shown

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.errors import RecordingError
+from dynident.errors import FitError, RecordingError
 from dynident.recording import Dataset, Filter
 from dynident.recording.dataset import Noise
-from synthetic import arm, synthetic, true_values
+from synthetic import ARM, arm, synthetic, true_values
 
 MODEL = di.Model(arm()) + "viscous_friction" + "coulomb_friction"
 TRUTH = true_values(MODEL, Fv__shoulder=1.2, Fv__elbow=0.5, Fc__shoulder=1.5, Fc__elbow=0.6)
@@ -86,3 +86,12 @@ def test_a_single_recording_is_data_enough() -> None:
             MODEL, Dataset((train,)), Dataset((test,)), most=0, propose="never"
         ).test_error
     )
+
+
+def test_models_whose_joints_differ_are_not_compared() -> None:
+    data = recorded(7)
+    fit = di.fit(MODEL, data)
+    turned_robot = di.Robot.from_text(ARM, joints=["elbow", "shoulder"])
+    other = di.fit(di.Model(turned_robot) + "viscous_friction", data)
+    with pytest.raises(FitError, match="joints elbow, shoulder where another model has shoulder"):
+        di.compare({"a": fit, "b": other}, data)

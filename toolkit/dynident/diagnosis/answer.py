@@ -251,7 +251,7 @@ class Answer:
         if self.only_bursts:
             return (
                 "No effect in the catalogue is of use, and what is left at "
-                f"{' and '.join(self.bursts)} is not all noise: a few bursts hold most of it, as "
+                f"{' and '.join(self.bursts)} is hardly noise: a few bursts hold most of it, as "
                 "noise of one size never does. How much of the rest is noise is unknown."
             )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
@@ -291,7 +291,8 @@ class Answer:
     @property
     def only_bursts(self) -> bool:
         """Whether bursts are all that speaks for something missing, and no noise floor is known."""
-        alone = self.verdict == "unexplained" and not self.steps and not self.following_motion
+        others = self.steps or self.following_motion or self.withdrawn or self.impossible
+        alone = self.verdict == "unexplained" and not others and self.limit is None
         return alone and bool(self.bursts) and self.noise_source == "unknown"
 
     @property

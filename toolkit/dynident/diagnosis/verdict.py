@@ -41,8 +41,8 @@ def verdict_of(
     steps : the effects added.
     last : the last ranking.
     criteria : of the verdict.
-    bursts : joints at which a few instants hold most of what the final model leaves. No size of
-        noise makes them, so that of a model without a step they say that something is missing.
+    bursts : joints at which a few instants hold most of what the final model leaves. Noise of one
+        size makes none, so that a model without a step is not called complete beside them.
     """
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
         if last.passing or (bursts and not steps):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,12 +172,12 @@ def compare(
     Raises
     ------
     FitError
-        If there is no estimate or no recording.
+        If there is no estimate or no recording, or the estimates' robots have other joints.
     """
     named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
     if not named:
         raise FitError("no estimate to compare", remedy="give one, or several by their names")
-    dataset = Dataset.of(dataset, next(iter(named.values())).robot.names)
+    dataset = Dataset.of(dataset, _joints_of(one.model for one in named.values()))
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
@@ -199,6 +199,16 @@ def compare(
         standing=standing_note(dataset),
         fitted_to=_fitted_to(named.values(), dataset),
     )
+
+
+def _joints_of(models: Iterable[Model]) -> tuple[str, ...]:
+    """Joints of models, which have the same ones in one order."""
+    first, *others = (one.robot.names for one in models)
+    for other in others:
+        if other != first:
+            what = f"joints {', '.join(other)} where another model has {', '.join(first)}"
+            raise FitError(what, remedy="compare models of one robot, its joints in one order")
+    return first
 
 
 def _fitted_to(estimates: Collection[Estimate], dataset: Dataset) -> tuple[str, ...]:
@@ -231,9 +241,9 @@ def compare_models(
     -------
     As `compare`, of the fitted models.
     """
-    first = next(iter(models.values()))
-    train, test = (one.of_joints(first.robot.names) for one in (train, test))
-    wiring = check_wiring(first, train, test, criteria.wiring)
+    joints = _joints_of(models.values())
+    train, test = (one.of_joints(joints) for one in (train, test))
+    wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
     train = without_stops(models.values(), train)
     test = without_stops(models.values(), test, standing_in(train))
     runs = gather(train, criteria.noise)

@@ -49,10 +49,13 @@ class DesignTask:
     loads: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        labels = [one for group in (*self.tell, self.show) for one in group]
-        if named := [one for one in labels if not isinstance(one, Effect)]:
-            what = f"{named[0]!r} where an effect is needed"
-            raise DesignError(what, remedy="take it of di.effects_of(label, robot)")
+        for group in (*self.tell, self.show):
+            if not isinstance(group, tuple | list):
+                remedy = "give tuples of effects, each of di.effects_of(label, robot)"
+                raise DesignError(f"{group!r} where several effects are needed", remedy=remedy)
+            if named := [one for one in group if not isinstance(one, Effect)]:
+                remedy = "take it of di.effects_of(label, robot)"
+                raise DesignError(f"{named[0]!r} where an effect is needed", remedy=remedy)
         for group in self.tell:
             if len(group) < 2:
                 raise DesignError("one effect to tell apart", remedy="name two, or use show")

@@ -39,7 +39,7 @@ _NEAR = 1e-6  # relative stationarity, violation and complementarity of a soluti
 _FAR = 1e-2  # relative stationarity where the objective merely became flat, on its way to infinity
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Attempt:
     """Where one start ended.
 

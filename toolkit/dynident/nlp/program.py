@@ -227,7 +227,7 @@ class Program(Shown):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ProgramSolution(Attempt, Shown):
+class ProgramSolution(Shown, Attempt):
     """The best of the starts: one with a solution before one without, then the lowest objective.
 
     Attributes

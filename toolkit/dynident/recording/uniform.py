@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -25,12 +25,19 @@ _LONGEST_STALE = 5
 
 
 @dataclass(eq=False)
+class _Said:
+    """Whether a warning was said, of a recording and of its copies with other windows."""
+
+    yet: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class _Even:
-    """A recording on a uniform clock, the warning that goes with it, and whether it was said."""
+    """A recording on a uniform clock, and the warning that goes with it."""
 
     recording: Recording
     words: str
-    said: bool = False
+    said: _Said = field(default_factory=_Said)
 
 
 _EVEN: WeakKeyDictionary[Recording, _Even] = WeakKeyDictionary()
@@ -79,7 +86,7 @@ def uniform(recording: Recording) -> Recording:
             return recording
         even = _resampled(recording, step)
     _EVEN[recording] = even
-    even.said = even.said or warn(f"{recording.where}: {even.words}")
+    even.said.yet = even.said.yet or warn(f"{recording.where}: {even.words}")
     return even.recording
 
 

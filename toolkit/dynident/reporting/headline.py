@@ -147,7 +147,7 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         said = f"No effect of the catalogue is of use, and {_in_training(diagnosis)}."
         return Headline("!", "a residual in training", said)
     if diagnosis.only_bursts:
-        said = "No effect of the catalogue is of use, and what is left is not all noise."
+        said = "No effect of the catalogue is of use, and what is left is hardly noise."
         return Headline("!", "a residual remains", said)
     if diagnosis.verdict == "unexplained":
         if known:

@@ -59,7 +59,7 @@ def _state(diagnosis: Diagnosis, joint: JointResult) -> JointState:
         words = "what is left follows the motion: it is not all noise"
         return JointState(joint, "failing", words, (2, joint.error_after))
     if diagnosis.only_bursts and joint.name in diagnosis.bursts:
-        words = "a few bursts hold most of what is left: it is not all noise"
+        words = "a few bursts hold most of what is left: it is hardly noise"
         return JointState(joint, "failing", words, (2, joint.error_after))
     if joint.error_after != joint.error_after:
         words = "none of its rows tells anything: it stands, or has no torque"

@@ -17,7 +17,7 @@ import numpy as np
 
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
-from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
+from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
@@ -149,7 +149,7 @@ def _final(
         for found in searches
         if found.best
         for one in _scores(evidence, fitted, [trial.found.effect for trial in found.best])
-        if not impossible(one, fitted)
+        if admissible(one, evidence, fitted)
         and one.drop_at_point > evidence.criteria.global_search.least * fitted.error_signal
     ]
     return max(scores, key=lambda one: one.fall, default=None)
@@ -199,7 +199,7 @@ def _shapes_on(
         tried = [effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(points)]
         scores = _scores(evidence, fitted, tried)
         return [
-            ScoreTrial(found=one, loss=-one.fall, admissible=not impossible(one, fitted))
+            ScoreTrial(found=one, loss=-one.fall, admissible=admissible(one, evidence, fitted))
             for one in scores
         ]
 

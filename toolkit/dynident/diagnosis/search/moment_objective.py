@@ -17,8 +17,8 @@ from scipy.linalg import block_diag
 from dynident.diagnosis.search.scoring import (
     Columns,
     Score,
+    admissible,
     candidate_moments,
-    impossible,
     moments_with_payload,
     score,
 )
@@ -210,15 +210,8 @@ class MomentObjective:
         )
 
     def _judged(self, found: Score) -> ScoreTrial:
-        # What the samples do not tell is no better shape, however little it leaves: a spring that
-        # only gives way, and never resonates, is explained by any stiffness that is high enough.
-        step = self.evidence.longest_step
-        return ScoreTrial(
-            found=found,
-            loss=-found.drop_at_point,
-            admissible=not impossible(found, self.fitted)
-            and not found.effect.unresolved(found.values, step),
-        )
+        possible = admissible(found, self.evidence, self.fitted)
+        return ScoreTrial(found=found, loss=-found.drop_at_point, admissible=possible)
 
     def _differentiated(self, effect: Effect) -> ScoreTrial:
         """The trial of an effect with its square root and derivatives."""

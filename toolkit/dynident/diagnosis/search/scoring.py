@@ -252,6 +252,25 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
     return ""
 
 
+def admissible(one: Score, evidence: Evidence, fitted: EvidenceFit) -> bool:
+    """Return whether a shape may be the best one.
+
+    What the samples do not tell is no better shape, however little it leaves: a spring that only
+    gives way, and never resonates, is explained by any stiffness that is high enough.
+
+    Parameters
+    ----------
+    one : the score of an effect with that shape.
+    evidence, fitted : the recordings, and the model without the effect as it fits them.
+
+    Returns
+    -------
+    Whether its values are possible, and the samples tell them.
+    """
+    told = not one.effect.unresolved(one.values, evidence.longest_step)
+    return told and not impossible(one, fitted)
+
+
 def _block_scores(
     fitted: EvidenceFit,
     with_model: SecondMoments,
