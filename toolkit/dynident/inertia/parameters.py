@@ -75,8 +75,15 @@ def point_inertia(place: ArrayLike) -> NDArray[np.float64]:
     Of squares of distances from the axes: of a place far along one of them, |place|^2 less the
     square along it keeps no digit.
     """
-    from_axes = np.cross(np.eye(3), place)
-    return from_axes @ from_axes.T
+    x, y, z = np.asarray(place, dtype=float)
+    xx, yy, zz = x * x, y * y, z * z
+    return np.array(
+        [
+            [yy + zz, -x * y, -x * z],
+            [-x * y, xx + zz, -y * z],
+            [-x * z, -y * z, xx + yy],
+        ]
+    )
 
 
 def from_com(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[np.float64]:
