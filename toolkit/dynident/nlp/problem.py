@@ -177,16 +177,11 @@ class Problem:
         return max(0.0, float(-np.linalg.eigvalsh(self.body_matrices(x)).min(initial=0.0)))
 
     def violation(self, x: np.ndarray) -> float:
-        """How far x breaks a linear or second-order constraint, relative to sizes; 0 inside.
-
-        To the value itself where that is larger than its size, of which a solver has no more
-        digits: the size of what is known well is small.
-        """
+        """How far x breaks a linear or second-order constraint, relative to sizes; 0 inside."""
         worst, linear = 0.0, self.linear
         if len(linear.A):
             value = linear.A @ x
-            broken = np.maximum(linear.lower - value, value - linear.upper)
-            worst = max(worst, *(broken / np.maximum(np.abs(value), 1.0)))
+            worst = max(worst, *(linear.lower - value), *(value - linear.upper))
         for value in self.cone_values(x):
             worst = max(worst, float(np.linalg.norm(value[1:]) - value[0]))
         return float(worst)
@@ -209,14 +204,20 @@ class Problem:
         return (relative[:, 0] <= _ROUNDING) & (relative[:, 4:].max(axis=1) > _ROUNDING)
 
     def retracted(self, x: np.ndarray) -> np.ndarray:
-        """Return x with what a solver left outside the consistent bodies moved inside, (s,).
+        """Return x with what a solver left outside the bounds and consistent bodies moved inside.
 
-        Each body gets as much of its reference body as it takes to be the inset inside, no less:
-        then no answer is better than the bound. The change is of the size of the solver's error.
+        An effect's parameter goes to its bound. Each body gets as much of its reference body as it
+        takes to be the inset inside, no less: then no answer is better than the bound. The change
+        is of the size of the solver's error.
         """
+        x = np.array(x)
+        for row, low, high in zip(self.linear.A, self.linear.lower, self.linear.upper, strict=True):
+            at = np.flatnonzero(row)
+            if len(at) == 1 and at[0] >= self.space.rigid:
+                k = at[0]
+                x[k] = np.clip(row[k] * x[k], low, high) / row[k]
         if self.within.consistency == "none":
             return x
-        x = np.array(x)
         references = self.body_matrices(self.space.reference)
         for k, matrix in enumerate(self.body_matrices(x)):
             least = float(eigh(matrix, references[k], eigvals_only=True)[0])
