@@ -28,6 +28,7 @@ AUTHORS = Filter(
     decimation="chebyshev",
     edge_s=(0.049, 0.0),
     ends="keep",
+    difference_order=2,
 )
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
 from dynident.recording import (
+    Filter,
     Recording,
     SpeedGain,
     central_difference,
@@ -15,42 +18,51 @@ from dynident.recording import (
     suited_position_cutoff,
 )
 
+Order = Literal[2, 8]
 RATE = 1000.0
 USUAL = 40.0
 
 
 def moved(std: float, *, rate: float = RATE, step: float = 0.0, scale: float = 1.0) -> Recording:
-    """Two joints that turn round at a jump of their acceleration, behind encoders."""
+    """Two joints behind encoders, of which one turns round beside jumps of its acceleration."""
     t = np.arange(0.0, 12.0, 1.0 / rate)
-    swing = np.column_stack([np.sin(3.0 * t) + 0.1 * np.abs(np.cos(3.0 * t)), np.cos(2.0 * t)])
+    x, turns = 3.0 * t, np.rint(3.0 * t / np.pi)
+    grows = 2.0 * turns + np.cos(np.pi * turns) * np.sin(x)  # with the speed |cos x|
+    swing = np.column_stack([np.sin(x) + 0.1 * (grows - 2.0 * x / np.pi), np.cos(2.0 * t)])
     q = swing + std * np.random.default_rng(1).normal(size=swing.shape)
     q = np.round(q / step) * step if step else q
     return Recording(t, scale * q, np.zeros_like(q), ("shoulder", "elbow"))
 
 
+@pytest.mark.parametrize("order", [2, 8])
 @pytest.mark.parametrize("cutoff", [None, 20.0, 100.0])
-def test_noise_of_speeds_is_what_is_said(cutoff: float | None) -> None:
+def test_noise_of_speeds_is_what_is_said(cutoff: float | None, order: Order) -> None:
     q = np.random.default_rng(0).normal(size=(200_000, 1))
     q = q if cutoff is None else lowpass(q, RATE, cutoff)
-    found = central_difference(q, RATE)[1000:-1000].std()
-    assert SpeedGain(RATE, cutoff).noise == pytest.approx(found, rel=0.02)
+    found = central_difference(q, RATE, order)[1000:-1000].std()
+    settings = Filter(position_cutoff_hz=cutoff, difference_order=order)
+    assert SpeedGain(RATE, settings).noise == pytest.approx(found, rel=0.02)
 
 
-@pytest.mark.parametrize("cutoff", [None, 20.0, 100.0])
-def test_speed_that_is_made_up_at_a_jump_is_what_is_said(cutoff: float | None) -> None:
+@pytest.mark.parametrize("order", [2, 8])
+@pytest.mark.parametrize("cutoff", [None, 20.0, 100.0, 400.0])
+def test_speed_that_is_made_up_at_a_jump_is_what_is_said(
+    cutoff: float | None, order: Order
+) -> None:
     """The speed is zero, and from an instant on it rises by 1 rad/s in each second."""
     t = np.arange(-2000, 2001) / RATE
     q = np.where(t > 0.0, 0.5 * t**2, 0.0)[:, None]
     q = q if cutoff is None else lowpass(q, RATE, cutoff)
-    found = central_difference(q, RATE)[2000, 0]
-    assert SpeedGain(RATE, cutoff).rounding == pytest.approx(found, rel=0.03)
+    found = central_difference(q, RATE, order)[2000, 0]
+    settings = Filter(position_cutoff_hz=cutoff, difference_order=order)
+    assert SpeedGain(RATE, settings).rounding == pytest.approx(found, rel=0.01)
 
 
 def test_the_finer_the_encoders_the_higher_the_cutoff() -> None:
     stds = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
     found = [suited_position_cutoff([moved(std)], 18.0) for std in stds]
     assert found == sorted(found, reverse=True)
-    assert found[0] == 4 * USUAL and found[-1] == USUAL
+    assert found[0] == 8 * USUAL and found[-1] == USUAL
 
 
 @pytest.mark.parametrize("std", [1e-6, 1e-3])
@@ -69,7 +81,7 @@ def test_steps_of_a_coarse_encoder_are_noise_though_it_hardly_ever_steps() -> No
 
 @pytest.mark.parametrize(
     ("rate", "expected"),
-    [(100.0, 20.0), (250.0, 40.0), (500.0, 80.0), (799.99, 160.0), (5000.0, 160.0)],
+    [(100.0, 40.0), (250.0, 80.0), (500.0, 160.0), (799.99, 320.0), (5000.0, 320.0)],
 )
 def test_a_slow_clock_bounds_it(rate: float, expected: float) -> None:
     assert suited_filter([moved(0.0, rate=rate)]).position_cutoff_hz == pytest.approx(expected)
@@ -102,7 +114,7 @@ def test_what_is_outside_of_a_window_does_not_count() -> None:
     both = Recording(np.arange(len(q)) / RATE, q, np.zeros_like(q), fine.joints)
     windows = (None, (0.0, 12.0), (12.0, 24.0))
     found = [suited_position_cutoff([both.replace(window=one)], 18.0) for one in windows]
-    assert found[1:] == [USUAL, 4 * USUAL] and found[0] < 4 * USUAL
+    assert found[1:] == [USUAL, 8 * USUAL] and found[0] < 8 * USUAL
 
 
 @pytest.mark.parametrize("std", [2e-4, 1e-3])

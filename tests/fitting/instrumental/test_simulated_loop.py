@@ -221,7 +221,9 @@ def test_every_controller_keeps_its_poles(kind):
         assert error < 0.005 * np.linalg.norm(true)
 
 
-@pytest.mark.parametrize("settings", [Filter(), FILTERED], ids=["unfiltered", "filtered"])
+@pytest.mark.parametrize(
+    "settings", [Filter(), replace(FILTERED, difference_order=2)], ids=["unfiltered", "filtered"]
+)
 def test_the_bias_of_sampling_is_foreseen(settings):
     """Without noise the whole error is that of differences and held torques: known to 5 %."""
     dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=True, seconds=20.0), settings)
@@ -231,6 +233,17 @@ def test_the_bias_of_sampling_is_foreseen(settings):
     error, foreseen = found.values - loops.truth(model), found.history.sampling_bias
     assert np.linalg.norm(error - foreseen) < 0.05 * np.linalg.norm(error)
     assert any("Sampling" in note for note in found.notes)
+
+
+def test_differences_of_high_order_leave_less_of_that_bias():
+    dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=True, seconds=20.0), FILTERED)
+    model = loops.model(coulomb=True)
+    bias = []
+    for order in (2, 8):
+        data = replace(dataset, filter=replace(FILTERED, difference_order=order))
+        found = di.fit(model, data, IV(loops.LOOP))
+        bias.append(np.linalg.norm(found.values - loops.truth(model)))
+    assert bias[1] < 0.6 * bias[0]
 
 
 def test_good_tracking_within_the_noise_is_not_doubted():

@@ -100,7 +100,7 @@ def diagnose(
     ----------
     model : the model as given (or an estimate of it: it is fitted anew, with instruments where
         the motion repeats).
-    train : recordings to fit; a single one takes the default filter.
+    train : recordings to fit; a single one takes the filter that suits it.
     test : recordings to judge by; without any, blocks of the training recordings are held out.
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.

@@ -160,7 +160,7 @@ def compare(
     ----------
     estimates : one, or several by name.
     dataset : recordings, with their filter and, where nothing repeats, their noise; a single one
-        takes the default filter.
+        takes the filter that suits it.
     controller : of the loop in which they were made: each estimate is simulated in it, too, where
         recordings have their reference.
     criteria : of the noise, of loops and of what residual maps show.

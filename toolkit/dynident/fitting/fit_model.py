@@ -68,8 +68,8 @@ def fit(
     Parameters
     ----------
     model : the robot and its effects.
-    data : recordings with their filter; a single recording takes the default filter. Their joints
-        are those of the robot by their names, in any order.
+    data : recordings with their filter; a single recording takes the filter that suits it. Their
+        joints are those of the robot by their names, in any order.
     method : an estimator: `LeastSquares`, `Constrained`, `IV`, `Regression`, or any other class
         with their `fit`; default: least squares, weighted per joint.
     client : of dask.distributed, whose workers make the passes of least squares over recordings:

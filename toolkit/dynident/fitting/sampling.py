@@ -42,7 +42,7 @@ _LEAST_BLOCK = 2048  # fewer do not pay for a function of many samples
 LEAST_ROWS = 20
 """Rows below which a recording says too little."""
 
-_OF_CUTOFF, _OF_POSITIONS = 20.0, 10.0
+_OF_CUTOFF, _OF_POSITIONS = 20.0, 5.0
 """Rate of a thinned motion over the cut-offs of columns and of positions, at least."""
 
 Evaluate = Callable[[Block], list[np.ndarray]]
@@ -157,7 +157,7 @@ class Sampled:
         Parameters
         ----------
         least_hz : rate of the samples, at least; and 20 times the cut-off of columns and torque,
-            10 times that of the positions. Recipes with decimation or ends of their own are
+            5 times that of the positions. Recipes with decimation or ends of their own are
             followed to the letter.
         """
         filter = self.parallel.filter

@@ -14,9 +14,14 @@ within a turn; `require_motion` and `require_torque` refuse recordings that show
 """
 
 from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
+from dynident.recording.derivatives import (
+    central_difference,
+    difference_gain,
+    held_gain,
+    held_torque_adjoint,
+)
 from dynident.recording.filters import (
     Filter,
-    central_difference,
     default_cutoff,
     default_filter,
     default_position_cutoff,
@@ -99,9 +104,12 @@ __all__ = [
     "default_cutoff",
     "default_filter",
     "default_position_cutoff",
+    "difference_gain",
     "differentiate",
     "frame_of",
     "frames_in",
+    "held_gain",
+    "held_torque_adjoint",
     "lowpass",
     "mismatch",
     "moving",

@@ -11,6 +11,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
+from dynident.recording.position_cutoff import common_filter
 from dynident.recording.recording import Recording
 from dynident.recording.usable_rows import usable
 
@@ -41,7 +42,8 @@ class Dataset:
     ----------
     recordings : in any number; unless the filter keeps the ends, their windows leave out where the
         robot stands still there, and a loop's transient before it repeats, see `usable`.
-    filter : None for `default_filter` at each recording's rate.
+    filter : by default `common_filter`, which suits the recordings; None, for `default_filter` at
+        each recording's rate, where their rates call for different ones.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -59,6 +61,8 @@ class Dataset:
         if self.filter is None or self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
+        if self.filter is None and recordings:
+            object.__setattr__(self, "filter", common_filter(recordings))
         for recording in self.recordings[1:]:
             if recording.joints != self.recordings[0].joints:
                 ours = ", ".join(self.recordings[0].joints)
@@ -77,7 +81,7 @@ class Dataset:
 
     @staticmethod
     def of(data: Dataset | Recording, joints: Sequence[str]) -> Dataset:
-        """Return data as recordings of these joints; a single one takes the default filter.
+        """Return data as recordings of these joints; a single one takes the filter that suits it.
 
         Raises
         ------

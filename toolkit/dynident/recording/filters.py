@@ -1,4 +1,4 @@
-"""The filter of a recording: its settings, zero-phase low-passes and central differences."""
+"""The filter of a recording: its settings, and zero-phase low-passes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from dynident.arguments import checked
 from dynident.errors import RecordingError
+from dynident.recording.derivatives import ORDERS
 from dynident.recording.low_pass.sections import butterworth_sections, slowest_pole
 from dynident.recording.low_pass.zero_phase import zero_phase
 
@@ -40,6 +41,8 @@ class Filter:
     ends : "drop" leaves out, beyond `edge_s`, what the filters and differences make up where they
         see past the record; "keep" uses all of the record, as some published recipes do, also where
         a joint sticks.
+    difference_order : order of accuracy of the central differences of positions, and of the torque
+        that held commands make: 2, 4, 6 or 8. None: see `order`.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class Filter:
     decimation: Literal["pick", "chebyshev"] = "pick"
     edge_s: tuple[float, float] = (0.0, 0.0)
     ends: Literal["drop", "keep"] = "drop"
+    difference_order: Literal[2, 4, 6, 8] | None = None
 
     def __post_init__(self) -> None:
         for name in ("position_cutoff_hz", "cutoff_hz", "rate_hz"):
@@ -66,6 +70,9 @@ class Filter:
             )
         if self.ends not in ("drop", "keep"):
             raise RecordingError(f"ends = {self.ends!r}", "filter", 'write "drop" or "keep"')
+        if self.difference_order not in (None, *ORDERS):
+            what = f"difference_order = {self.difference_order!r}"
+            raise RecordingError(what, "filter", "write 2, 4, 6 or 8")
         if len(self.edge_s) != 2 or not all(math.isfinite(e) and e >= 0 for e in self.edge_s):
             remedy = "give two times in s, not negative"
             raise RecordingError(f"edge_s = {self.edge_s!r}", "filter", remedy)
@@ -84,8 +91,18 @@ class Filter:
             f"parallel low-pass {self.cutoff_hz:g} Hz" if self.cutoff_hz else "",
             f"decimated to {self.rate_hz:g} Hz ({self.decimation})" if self.rate_hz else "",
             "ends kept" if self.ends == "keep" else "",
+            f"differences of order {self.difference_order}" if self.difference_order else "",
         ]
         return ", ".join(part for part in parts if part) or "none"
+
+    @property
+    def order(self) -> int:
+        """Order of accuracy of the differences.
+
+        Where none is stated 8 behind a low-pass of the positions, and 2 without: the higher it is,
+        the more of the noise near half the sampling rate it lets through.
+        """
+        return self.difference_order or (ORDERS[-1] if self.position_cutoff_hz else ORDERS[0])
 
     def narrowed(self, share: float, rate_hz: float) -> Filter:
         """Return the filter with its cut-offs at a share of what they are, for samples at a rate.
@@ -113,13 +130,13 @@ class Filter:
         """Samples at either end whose derivatives are not used, at a sampling rate in Hz.
 
         Besides `edge_s`: 3 periods of the position's cut-off, after which the transient of its
-        filter is below 1 % of the acceleration, and at least the 2 samples at which differences
-        are one-sided.
+        filter is below 1 % of the acceleration, and at least the samples from which differences
+        reach past the ends.
         """
         least = 0
         if self.ends == "drop":
             cutoff = self.position_cutoff_hz
-            least = max(2, math.ceil(3.0 / cutoff * rate_hz) if cutoff else 0)
+            least = max(self.order, math.ceil(3.0 / cutoff * rate_hz) if cutoff else 0)
         first, last = (max(round(edge * rate_hz), least) for edge in self.edge_s)
         return first, last
 
@@ -233,25 +250,6 @@ def _sections(share: float, order: int) -> np.ndarray:
     """A low-pass with its cut-off at a share of half the sampling rate; not to be written to."""
     found = butterworth_sections(share, order)
     found.flags.writeable = False
-    return found
-
-
-def central_difference(x: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Derivative along axis 0 by central differences (one-sided at the two ends).
-
-    Parameters
-    ----------
-    x : (T, ...), at least 2 rows.
-    rate_hz : sampling rate.
-
-    Returns
-    -------
-    (T, ...), per s.
-    """
-    step, found = 1.0 / rate_hz, np.empty(x.shape)
-    np.subtract(x[2:], x[:-2], out=found[1:-1])
-    found[1:-1] /= 2.0 * step
-    found[0], found[-1] = (x[1] - x[0]) / step, (x[-1] - x[-2]) / step
     return found
 
 

@@ -13,14 +13,8 @@ from typing import ClassVar
 import numpy as np
 
 from dynident.errors import RecordingError
-from dynident.recording.filters import (
-    FORGOTTEN,
-    Filter,
-    butterworth,
-    central_difference,
-    lowpass,
-    memory,
-)
+from dynident.recording.derivatives import central_difference, held_torque
+from dynident.recording.filters import FORGOTTEN, Filter, butterworth, lowpass, memory
 from dynident.recording.recording import Recording
 
 _FEW = 16
@@ -144,10 +138,11 @@ class MotionInParts:
     @cached_property
     def _reach(self) -> int:
         """Samples around a part that show in it."""
-        cutoff = self.filter.position_cutoff_hz
+        cutoff, own = self.filter.position_cutoff_hz, self.filter.order  # of two differences
         if cutoff is None:
-            return 2  # of the differences
-        return 2 + memory(butterworth(self.rate_hz, cutoff, where=self.recording.where), FORGOTTEN)
+            return own
+        passes = butterworth(self.rate_hz, cutoff, where=self.recording.where)
+        return own + memory(passes, FORGOTTEN)
 
     @cached_property
     def whole(self) -> Motion:
@@ -176,12 +171,12 @@ class MotionInParts:
         q = recording.q[low:high]
         if self.filter.position_cutoff_hz is not None:
             q = lowpass(q, rate, self.filter.position_cutoff_hz, where=recording.where)
-        v = central_difference(q, rate)
-        a = central_difference(v, rate)
+        v = central_difference(q, rate, self.filter.order)
+        a = central_difference(v, rate, self.filter.order)
         kept = slice(start - low, stop - low)
         tau = recording.tau[low:high]
         if recording.torque == "held_command":
-            tau = np.concatenate([tau[:1], (tau[:-1] + tau[1:]) / 2])
+            tau = held_torque(tau, self.filter.order)
         return Motion(
             t=recording.t[start:stop],
             q=q[kept],

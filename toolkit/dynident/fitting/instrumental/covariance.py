@@ -17,7 +17,7 @@ from dynident.fitting.instrumental.torque_jacobians import torque_jacobians
 from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.model import Model
-from dynident.recording import Dataset, central_difference, lowpass
+from dynident.recording import Dataset, central_difference, held_torque_adjoint, lowpass
 
 _BLOCK = 8192
 
@@ -87,9 +87,9 @@ def _carried(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield what a unit of encoder and of torque noise does to V' O^-1 e, (T, n, r) each."""
     motion, parallel, rate = sampled.motion, sampled.parallel, sampled.motion.rate_hz
-    cutoff = parallel.filter.position_cutoff_hz
+    cutoff, order = parallel.filter.position_cutoff_hz, parallel.filter.order
     # Each filter is passed twice: forth to the rows, and back.
-    margin = 2 * parallel.overlap + (round(2 * rate / cutoff) if cutoff else 0) + 8
+    margin = 2 * parallel.overlap + (round(2 * rate / cutoff) if cutoff else 0) + 8 + order
     kept_rows = parallel.rows(motion.samples)[sampled.kept]
     known = sampled.whole_columns(model, values)
     for start in range(0, motion.samples, _BLOCK):
@@ -116,23 +116,24 @@ def _carried(
             np.pad(jacobian.transpose(0, 2, 1) @ back, ends)
             for jacobian in (jacobians.by_a, jacobians.by_v, jacobians.by_q)
         )
-        found = _differences(_differences(acceleration, rate) - speed, rate) + position
+        found = _differences(acceleration, rate, order) - speed
+        found = _differences(found, rate, order) + position
         if cutoff:
             found = lowpass(found, rate, cutoff)
         torque = back = np.pad(back, ends)
         if sampled.recording.torque == "held_command":
-            torque = np.concatenate([(back[:-1] + back[1:]) / 2, back[-1:] / 2])
+            torque = held_torque_adjoint(back, order)
         yield found[core], torque[core]
 
 
-def _differences(x: np.ndarray, rate: float) -> np.ndarray:
+def _differences(x: np.ndarray, rate: float, order: int) -> np.ndarray:
     """Minus the adjoint of central differences, which are antisymmetric.
 
     Of rows that are zero beyond both ends: the one-sided differences there belong to rows that are
     not used (see `source.prepared`).
     """
-    padded = np.pad(x, ((2, 2), (0, 0), (0, 0)))
-    return central_difference(padded, rate)[2:-2]
+    padded = np.pad(x, ((order, order), (0, 0), (0, 0)))
+    return central_difference(padded, rate, order)[order:-order]
 
 
 def block_covariance(

@@ -17,7 +17,7 @@ from dynident.fitting.instrumental.torque_jacobians import torque_jacobians
 from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.noise_shapes import filter_power
 from dynident.model import Model
-from dynident.recording import Dataset
+from dynident.recording import Dataset, difference_gain, held_gain
 
 _GROUPS = 300
 """Means of neighbouring frequencies of a recording that are fitted."""
@@ -124,6 +124,7 @@ def _design(
 ) -> np.ndarray:
     """Density of each joint's residual that a unit of each variance makes, (F, n, 2 n)."""
     n, rate, out = model.robot.n, own.motion.rate_hz, own.rate_hz
+    order = own.parallel.filter.order
     every = slice(None, None, max(1, smooth.motion.samples // 2000))
     block = model.with_regressor(smooth.block(model, every))
     found = torque_jacobians(model, values, block, position_std * rate)
@@ -132,9 +133,10 @@ def _design(
     for fold in range(-_FOLDS, _FOLDS + 1):
         raw = np.abs(f + fold * out)
         torque, encoder = filter_power(own, raw)
-        slope = (rate * np.sin(2 * np.pi * raw / rate)) ** 2
+        angle = 2 * np.pi * raw / rate
+        slope = (rate * difference_gain(angle, order)) ** 2
         if own.recording.torque == "held_command":
-            torque = torque * np.cos(np.pi * raw / rate) ** 2
+            torque = torque * held_gain(angle, order) ** 2
         inside = (raw <= rate / 2) / rate
         for j in range(n):
             design[:, j, n + j] += inside * torque

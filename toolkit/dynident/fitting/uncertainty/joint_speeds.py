@@ -76,8 +76,7 @@ class JointSpeeds:
     @cached_property
     def _gain(self) -> SpeedGain:
         """From positions to speeds."""
-        cutoff = self.sampled.parallel.filter.position_cutoff_hz
-        return SpeedGain(self.sampled.recording.rate_hz, cutoff)
+        return SpeedGain(self.sampled.recording.rate_hz, self.sampled.parallel.filter)
 
     def used(self) -> Iterator[np.ndarray]:
         """Yield them (T, n) from the first to the last row that is used, part by part."""
