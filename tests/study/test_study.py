@@ -138,7 +138,7 @@ def test_only_robot_and_recordings_are_needed(study):
     ("table", "expected"),
     [
         ("position_cutoff_hz = 30.0", (30.0, 13.5, 37.5)),
-        ("rate_hz = 20.0", (20.0, 7.2, 20.0)),
+        ("rate_hz = 20.0", (40.0, 7.2, 20.0)),
         ("cutoff_hz = 18.0", (36.0, 18.0, None)),
         ('position_cutoff_hz = 30.0\ncutoff_hz = "none"', (30.0, None, None)),
         ('position_cutoff_hz = "none"', (None, None, None)),
@@ -475,7 +475,9 @@ def test_training_and_test_recordings_have_one_filter(tmp_path, of_test, expecte
 
 def test_recordings_of_very_different_rates_have_each_their_own(tmp_path):
     both = _behind_encoders(tmp_path, (1000.0, 1e-6), (100.0, 1e-6))
-    assert both.train.filter is None and both.test.filter is None
+    for part in (both.train, both.test):
+        assert part.filter == suited_filter(part.recordings)
+    assert both.train.filter != both.test.filter
     assert len(compare_models({"one": both.model}, both.train, both.test).results) == 1
 
 

@@ -20,9 +20,9 @@ from dynident.diagnosis.nuisances.sticking import (
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
+from dynident.fitting.reversals.joint_speeds import JointSpeeds
+from dynident.fitting.reversals.standing_joints import near_stops, without_stops
 from dynident.fitting.sampling import sample
-from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
-from dynident.fitting.uncertainty.standing_joints import near_stops, without_stops
 from dynident.recording import Dataset, Recording, default_filter
 from dynident.reporting.headline import headline
 from standing_arm import COULOMB, RATE_HZ, STOPPED, WIDTH, given, record

@@ -17,8 +17,8 @@ from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
+from dynident.fitting.reversals.standing_joints import standing_in, standing_note, without_stops
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
-from dynident.fitting.uncertainty.standing_joints import standing_in, standing_note, without_stops
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.tables import Shown, Table, finite, mostly_noise, percent

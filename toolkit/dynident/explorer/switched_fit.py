@@ -21,8 +21,8 @@ from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares, estimate_of
 from dynident.fitting.linear_solution import solve_factors
+from dynident.fitting.reversals.standing_joints import standing_in, without_stops
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
-from dynident.fitting.uncertainty.standing_joints import standing_in, without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.study import Study

@@ -8,17 +8,22 @@ from typing import ClassVar, Protocol
 from dynident.arguments import checked
 from dynident.clusters import Cluster, working_on
 from dynident.errors import FitError
+from dynident.fitting.consistent.constrained import Constrained
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
-from dynident.fitting.row_objective import refine_shapes, shaped_effects
-from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit
-from dynident.fitting.uncertainty.shape_errors import with_shape_errors
-from dynident.fitting.uncertainty.standing_joints import (
+from dynident.fitting.reversals.misplaced_reversals import (
+    misplaced_note,
+    without_misplaced_reversals,
+)
+from dynident.fitting.reversals.standing_joints import (
     standing_in,
     standing_note,
     too_wide_note,
     without_stops,
 )
+from dynident.fitting.row_objective import refine_shapes, shaped_effects
+from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit
+from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.threads import single_threaded
@@ -63,7 +68,9 @@ def fit(
 
     Shape parameters of effects are refined first, by variable projection; the linear parameters
     follow from the method. Rows around stops of joints that stand do not count, see
-    `Recording.stops`: no data tell their dry friction.
+    `Recording.stops`: no data tell their dry friction. Nor do, by least squares, constrained or
+    not, rows around reversals that the filter and the sampling put at another moment, where that
+    would bias the estimate.
 
     Parameters
     ----------
@@ -100,13 +107,27 @@ def fit(
 def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     dataset = without_stops(model, dataset)
     estimate = _with_shapes(model, dataset, method)
+    counted, dataset = dataset, _without_misplaced(estimate, dataset, method)
+    if dataset is not counted:
+        estimate = _with_shapes(model, dataset, method)
     if not isinstance(method, LeastSquares):  # which widens its sigma by what speaks against it
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
         said = (estimate.headline, judged.headline if judged is not None else "")
         estimate = replace(estimate, headline=" ".join(filter(None, said)))
-    notes = (standing_note(dataset), too_wide_note(model, dataset))
+    notes = (
+        standing_note(counted),
+        too_wide_note(model, counted),
+        misplaced_note(counted, dataset),
+    )
     notes = (*estimate.notes, *filter(None, notes))
-    return replace(estimate, notes=notes, standing=standing_in(dataset))
+    return replace(estimate, notes=notes, standing=standing_in(counted))
+
+
+def _without_misplaced(estimate: Estimate, dataset: Dataset, method: Method) -> Dataset:
+    """Leave out reversals that a filter has moved; instruments and noisy inputs allow for them."""
+    if isinstance(method, LeastSquares | Constrained):
+        return without_misplaced_reversals(estimate, dataset)
+    return dataset
 
 
 def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:

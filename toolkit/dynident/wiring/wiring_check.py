@@ -8,7 +8,7 @@ import numpy as np
 
 from dynident.criteria import DEFAULTS, WiringCriteria
 from dynident.errors import without_warnings
-from dynident.fitting.uncertainty.standing_joints import without_stops
+from dynident.fitting.reversals.standing_joints import without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded

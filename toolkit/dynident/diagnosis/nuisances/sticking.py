@@ -23,8 +23,8 @@ from dynident.criteria import StickingCriteria
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
-from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
-from dynident.fitting.uncertainty.standing_joints import (
+from dynident.fitting.reversals.joint_speeds import JointSpeeds
+from dynident.fitting.reversals.standing_joints import (
     few_enough,
     left_out_words,
     near_stops,

@@ -8,7 +8,7 @@ from dynident.diagnosis.nuisances.friction_width import WidthProfile
 from dynident.diagnosis.nuisances.sticking import left_out_at
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.fitting.uncertainty.standing_joints import width_advice
+from dynident.fitting.reversals.standing_joints import width_advice
 from dynident.tables import number
 
 

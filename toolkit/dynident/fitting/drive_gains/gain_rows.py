@@ -16,8 +16,8 @@ import numpy as np
 from dynident.effects import effects_of
 from dynident.errors import StudyError
 from dynident.fitting.loads import Load, LoadSplit, placement, split
+from dynident.fitting.reversals.standing_joints import without_stops
 from dynident.fitting.sampling import Sampled, sample
-from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.inertia import frame_change
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise

@@ -9,8 +9,8 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.noisy_inputs.measured import InputNoise
+from dynident.fitting.reversals.standing_joints import without_stops
 from dynident.fitting.sampling import rows, sample
-from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Recording, uniform

@@ -14,7 +14,7 @@ from dynident.fitting.linear_solution import residual_std
 from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
 from dynident.fitting.noisy_inputs.measured import InputNoise, input_noise
 from dynident.fitting.noisy_inputs.posed import PIECES, PosedRegression, pose
-from dynident.fitting.uncertainty.standing_joints import without_stops
+from dynident.fitting.reversals.standing_joints import without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded

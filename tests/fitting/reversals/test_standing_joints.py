@@ -14,9 +14,8 @@ from dynident.criteria import DEFAULTS
 from dynident.evidence.comparison import compare_models
 from dynident.fitting.instrumental import Filtered
 from dynident.fitting.noisy_inputs import encoder_noise, input_noise
-from dynident.fitting.sampling import BLOCK, sample
-from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
-from dynident.fitting.uncertainty.standing_joints import (
+from dynident.fitting.reversals.joint_speeds import JointSpeeds
+from dynident.fitting.reversals.standing_joints import (
     few_enough,
     near_stops,
     resting,
@@ -25,6 +24,7 @@ from dynident.fitting.uncertainty.standing_joints import (
     stands,
     without_stops,
 )
+from dynident.fitting.sampling import BLOCK, sample
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Filter, Noise, Recording, default_filter, lowpass
 from standing_arm import COULOMB, RATE_HZ, STOPPED, given, record, resting_joint
@@ -235,7 +235,7 @@ def test_a_stop_is_one_whichever_part_of_the_recording_it_lies_in(
     (one,) = standing(3).recordings
     whole = JointSpeeds(sample(one, None))
     expected = near_stops(whole, DEFAULTS.sticking)
-    where = "dynident.fitting.uncertainty.joint_speeds"
+    where = "dynident.fitting.reversals.joint_speeds"
     monkeypatch.setattr(f"{where}.BLOCK", BLOCK // 37)
     monkeypatch.setattr(f"{where}._AT_ONCE", 0)
     parts = JointSpeeds(sample(one, None))

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from dynident.criteria import DEFAULTS, StickingCriteria
+from dynident.fitting.reversals.joint_speeds import JointSpeeds
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
-from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.formulas import quoted_joint
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, uniform
@@ -174,7 +174,7 @@ def without_stops(
     near, few = _around_stops(recordings, dataset.filter, (rest, which), criteria)
     which = which & (few | (known & rest.all(axis=0)))
     pairs = zip(recordings, near, strict=True)
-    marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
+    marked = [with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
     return replace(dataset, recordings=tuple(marked))
 
 
@@ -324,8 +324,14 @@ def _unknown_within(speeds: JointSpeeds, criteria: StickingCriteria) -> np.ndarr
     return np.maximum(criteria.noise * speeds.noise, criteria.rounded * speeds.rms)
 
 
-def _with_stops(sampled: Sampled, rows: np.ndarray) -> Recording:
-    """A recording that says when its rows (T, n) do not count."""
+def with_stops(sampled: Sampled, rows: np.ndarray) -> Recording:
+    """Return a recording that says when its rows do not count.
+
+    Parameters
+    ----------
+    sampled : the recording.
+    rows : (T, n) mask of those that are used.
+    """
     half = 0.5 / sampled.rate_hz
     stops = []
     for column in rows.T:

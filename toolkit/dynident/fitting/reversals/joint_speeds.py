@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -84,21 +84,34 @@ class JointSpeeds:
             yield self._part(slice(start, min(start + BLOCK, self._used.stop)))
 
     def slower(self, limits: np.ndarray, rounding: float = 0.0) -> Iterator[np.ndarray]:
-        """Yield how much of each row's low-pass lies within a speed, (T, n), part by part.
+        """Return how much of each row's low-pass lies within a speed, (T, n), part by part.
 
         Parameters
         ----------
         limits : (n,) the speed, rad/s or m/s; a negative one for joints that are not asked for.
         rounding : s, times the largest acceleration around a sample: speeds below count, too.
         """
-        full, asked = self._full, limits >= 0
-        for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
-            v = self._part(plan.raw)
-            within = np.tile(limits, (len(v), 1))
+        asked = limits >= 0
+
+        def within(v: np.ndarray) -> np.ndarray:
+            most = np.tile(limits, (len(v), 1))
             if rounding:
                 made_up = rounding * self._largest_around(v[:, asked])
-                within[:, asked] = np.maximum(within[:, asked], made_up)
-            yield full.parallel.apply_block((np.abs(v) <= within).astype(float), plan)
+                most[:, asked] = np.maximum(most[:, asked], made_up)
+            return (np.abs(v) <= most).astype(float)
+
+        return self.passed(within)
+
+    def passed(self, signal: Callable[[np.ndarray], np.ndarray]) -> Iterator[np.ndarray]:
+        """Yield a function of the speeds, low-passed, in the rows that are used, part by part.
+
+        Parameters
+        ----------
+        signal : of speeds (S, n) in consecutive samples, of the same shape.
+        """
+        full = self._full
+        for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
+            yield full.parallel.apply_block(signal(self._part(plan.raw)), plan)
 
     def _largest_around(self, v: np.ndarray) -> np.ndarray:
         """Largest acceleration within a period of the positions' cut-off, (T, n)."""
