@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import RLock
 
 import numpy as np
@@ -21,10 +21,13 @@ from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares, estimate_of
 from dynident.fitting.linear_solution import solve_factors
+from dynident.fitting.reversals.misplaced_reversals import fitted_without
 from dynident.fitting.reversals.standing_joints import standing_in, without_stops
+from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
 from dynident.moments.factors import factorise
+from dynident.recording import Dataset
 from dynident.study import Study
 from dynident.threads import single_threaded
 
@@ -57,8 +60,8 @@ class Refitter:
     """Fits a study's model with effects more, quickly: columns are evaluated once and kept.
 
     The shapes of effects stay as they are given: they were sought by the diagnosis. Values are
-    those of `LeastSquares().fit`, held-out errors those of `compare`; where a study has no test
-    recordings, those of `compare_models`, on blocks of time.
+    those of `di.fit` with these shapes, held-out errors those of `compare`; where a study has no
+    test recordings, those of `compare_models`, on blocks of time.
 
     Parameters
     ----------
@@ -133,24 +136,30 @@ class Refitter:
 
     def _estimate(self, model: Model) -> Estimate:
         """Least squares on the columns that are kept."""
-        train = self._recorded
+        quick = partial(self._quickly, model)
         if model.needs_values:  # columns depend on the fit, and are taken again and again
-            return LeastSquares(errors="independent").fit(model, train)
-        factors = factorise(self._rows(model, run) for run in range(len(self._train.runs)))
+            quick = partial(LeastSquares(errors="independent").fit, model)
+        return fitted_without(quick, self._recorded)[0]
+
+    def _quickly(self, model: Model, train: Dataset) -> Estimate:
+        factors = factorise(
+            self._rows(model, run, sample(one, train.filter))
+            for run, one in enumerate(train.recordings)
+        )
         solution = solve_factors(model, factors)
         return estimate_of(LeastSquares.name, "joint", model, train, factors, solution)
 
-    def _rows(self, model: Model, run: int) -> tuple[np.ndarray, np.ndarray]:
-        """Columns (T, n, p) and torque (T, n) of a recording."""
+    def _rows(self, model: Model, run: int, sampled: Sampled) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (T, n, p) and torque (T, n) of a recording, zero in rows that do not count."""
         joints = range(model.robot.n)
         found = [model_columns(self._train, model, run, j, None)[0] for j in joints]
-        rows = self._train.runs[run].replicates[0].counted(np.stack(found, axis=1))
+        rows = sampled.counted(np.stack(found, axis=1))
         return rows[:, :, :-1], rows[:, :, -1]
 
     @single_threaded
     def _with_intervals(self, effects: tuple[Effect, ...]) -> Estimate:
-        method, train = LeastSquares(), self._recorded
-        estimate = method.fit(self.model + effects, train)
+        method, model = LeastSquares(), self.model + effects
+        estimate, train = fitted_without(partial(method.fit, model), self._recorded)
         return with_shape_errors(estimate, lambda one: method.fit(one, train))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar, Protocol
 
 from dynident.arguments import checked
@@ -11,10 +12,7 @@ from dynident.errors import FitError
 from dynident.fitting.consistent.constrained import Constrained
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
-from dynident.fitting.reversals.misplaced_reversals import (
-    misplaced_note,
-    without_misplaced_reversals,
-)
+from dynident.fitting.reversals.misplaced_reversals import fitted_without, misplaced_note
 from dynident.fitting.reversals.standing_joints import (
     standing_in,
     standing_note,
@@ -106,9 +104,10 @@ def fit(
 
 def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     dataset = without_stops(model, dataset)
-    estimate = _with_shapes(model, dataset, method)
-    counted, dataset = dataset, _without_misplaced(estimate, dataset, method)
-    if dataset is not counted:
+    counted = dataset
+    if isinstance(method, LeastSquares | Constrained):
+        estimate, dataset = fitted_without(partial(_with_shapes, model, method=method), dataset)
+    else:  # instruments and noisy inputs allow for what reversals are seen through
         estimate = _with_shapes(model, dataset, method)
     if not isinstance(method, LeastSquares):  # which widens its sigma by what speaks against it
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
@@ -121,13 +120,6 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     )
     notes = (*estimate.notes, *filter(None, notes))
     return replace(estimate, notes=notes, standing=standing_in(counted))
-
-
-def _without_misplaced(estimate: Estimate, dataset: Dataset, method: Method) -> Dataset:
-    """Leave out reversals that a filter has moved; instruments and noisy inputs allow for them."""
-    if isinstance(method, LeastSquares | Constrained):
-        return without_misplaced_reversals(estimate, dataset)
-    return dataset
 
 
 def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:

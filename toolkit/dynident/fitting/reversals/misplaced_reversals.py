@@ -9,7 +9,7 @@ deviations where the noise is small. These rows of that joint do not count in a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,6 +73,21 @@ class _Friction:
 def _log_cosh(x: np.ndarray) -> np.ndarray:
     """Logarithm of cosh x, and ln 2 more."""
     return np.logaddexp(x, -x)
+
+
+def fitted_without(
+    fit: Callable[[Dataset], Estimate], dataset: Dataset
+) -> tuple[Estimate, Dataset]:
+    """Return a fit in which misplaced reversals do not count, and the dataset without them.
+
+    Parameters
+    ----------
+    fit : by least squares, which is asked twice where there are any.
+    dataset : with them.
+    """
+    estimate = fit(dataset)
+    counted = without_misplaced_reversals(estimate, dataset)
+    return (estimate if counted is dataset else fit(counted)), counted
 
 
 def without_misplaced_reversals(estimate: Estimate, dataset: Dataset) -> Dataset:
