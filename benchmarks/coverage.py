@@ -25,6 +25,7 @@ from two_link_loop import Lab
 
 _TORQUE = (2.0, 0.8)
 _QUIET = (0.4, 0.2)
+_SHARP = 0.02  # rad/s, over which dry friction reverses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,7 @@ class Case:
     ----------
     arm : module of the arm that is recorded: its model and its true parameters.
     inertial : whether only inertial parameters are.
+    width : rad/s, over which the model's dry friction reverses; None: as the arm's module has it.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Case:
     filter: Filter | None = None
     method: Any = None
     inertial: bool = False
+    width: float | None = None
     rival: Any = field(default_factory=lambda: di.LeastSquares(errors="independent"))
 
 
@@ -74,6 +77,18 @@ def cases() -> tuple[Case, ...]:
         noise = f"torque noise over {colour:g} s, default filter"
         lab = Lab(torque_std=_TORQUE, colour_s=colour)
         found.append(Case(name=f"LS, {noise}", lab=lab))
+    for rate, seconds, waves_s in ((200.0, 24.0, 8.0), (200.0, 24.0, 2.0), (1000.0, 24.0, 2.0)):
+        lab = Lab(
+            torque_std=(0.1, 0.05),
+            position_std=1e-5,
+            width=_SHARP,
+            rate_hz=rate,
+            gain=rate / two_link_loop.RATE,
+            waves_s=waves_s,
+            seconds=seconds,
+        )
+        name = f"LS, sharp friction, little noise, {rate:g} Hz, motion from {1 / waves_s:g} Hz on"
+        found.append(Case(name=name, lab=lab, width=_SHARP))
     for words, lab in (
         ("torque noise", SixAxisLab()),
         ("encoder 3e-05 rad too", SixAxisLab(position_std=3e-5)),
@@ -88,7 +103,7 @@ def cases() -> tuple[Case, ...]:
 
 def coverage(case: Case, seeds: range) -> tuple[float, float]:
     """Share of the truth within 1.96 sigma, of the method and of its rival (NaN if none)."""
-    model = case.arm.model()
+    model = case.arm.model(*filter(None, [case.width]))
     truth = case.arm.truth(model)
     part = slice(0, model.base.rank if case.inertial else model.size)
     recordings = [

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from math import ceil
 
 import casadi
 import numpy as np
@@ -39,6 +40,8 @@ WIDTH = 0.05
 """Of tanh(v / width) in the dry friction, rad/s, where none is said."""
 
 _SETTLING = 0.5  # s
+_STEP = 1e-4
+"""s, of the integrator at most where friction reverses more sharply than `WIDTH`."""
 _LENGTH, _G = 0.4, 9.81
 _M1, _X1, _Y1, _J1 = 4.0, 4 * 0.2, 4 * 0.01, 0.06 + 4 * (0.2**2 + 0.01**2)
 _M2, _X2, _Y2, _J2 = 2.0, 2 * 0.15, -2 * 0.01, 0.02 + 2 * (0.15**2 + 0.01**2)
@@ -60,6 +63,9 @@ class Lab:
     asymmetry : N m s/rad, half of what the elbow's viscous friction differs between its directions.
     rotor : kg m^2, of the elbow's drive.
     width : rad/s, over which dry friction reverses.
+    rate_hz : of the samples and of the loop.
+    gain : of the loop, over `KP` and `KD`: a slow loop bears less.
+    waves_s : period of the slowest wave of the motion; by default that of the whole, 8 at most.
     seconds : of each recording.
     period : whether the motion repeats with `PERIOD` and the recording says so.
     """
@@ -74,19 +80,23 @@ class Lab:
     asymmetry: float = 0.0
     rotor: float = 0.0
     width: float = WIDTH
+    rate_hz: float = RATE
+    gain: float = 1.0
+    waves_s: float | None = None
     seconds: float = 12.0
     period: bool = False
 
     def recordings(self, seeds: range) -> list[Recording]:
         """One recording for each seed."""
         # The loop settles before the record begins.
-        count = round((self.seconds + _SETTLING) * RATE) + 1
+        count = round((self.seconds + _SETTLING) * self.rate_hz) + 1
         rngs = [np.random.default_rng([seed, 15]) for seed in seeds]
         waves = np.stack([rng.normal(size=(2, 2, 5)) for rng in rngs])
         noise = np.stack([rng.normal(size=(count, 2)) for rng in rngs]) * self.position_std
-        t = np.arange(count) / RATE
-        q_ref, v_ref = _references(waves, t, self.seconds if not self.period else PERIOD)
-        begin = round(_SETTLING * RATE)
+        t = np.arange(count) / self.rate_hz
+        slowest = self.waves_s or min(PERIOD if self.period else self.seconds, 8.0)
+        q_ref, v_ref = _references(waves, t, slowest)
+        begin = round(_SETTLING * self.rate_hz)
         q, tau = (x[:, begin:] for x in self._moved(q_ref, v_ref, noise))
         t, q_ref = t[begin:] - t[begin], q_ref[:, begin:]
         std = np.array(self.torque_std)
@@ -109,7 +119,9 @@ class Lab:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and commanded torques, (S, T, 2) each."""
         S, T, _ = q_ref.shape
-        loop, found = _loop(T), np.empty((S, T, 4))
+        finest = 1.0 / self.rate_hz if self.width >= WIDTH else _STEP
+        loop = _loop(T, self.rate_hz, self.gain, ceil(1.0 / self.rate_hz / finest))
+        found = np.empty((S, T, 4))
         laws = (
             self.stribeck,
             self.offset,
@@ -121,30 +133,35 @@ class Lab:
         )
         hidden = np.tile(laws, (T, 1))
         for i in range(S):
-            start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / RATE)]
+            start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / self.rate_hz)]
             _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i], hidden]).T)
             found[i] = np.asarray(out).T
         return found[..., :2], found[..., 2:]
 
 
 @cache
-def _loop(samples: int) -> casadi.Function:
+def _loop(samples: int, rate_hz: float, gain: float, steps: int) -> casadi.Function:
     """The sampled loop, replayed without Python between its samples.
 
     From positions, velocities and the positions measured before, and, a column a sample,
     references, noise and what is hidden (as in `Lab`); to what is measured and commanded. A command
-    is held for a step of the classical Runge-Kutta method.
+    is held for some steps of the classical Runge-Kutta method.
     """
     x, before = casadi.SX.sym("x", 4), casadi.SX.sym("before", 2)
     q_ref, v_ref, noise = (casadi.SX.sym(name, 2) for name in ("q_ref", "v_ref", "noise"))
-    hidden, h = casadi.SX.sym("hidden", 7), 1.0 / RATE
+    hidden, h = casadi.SX.sym("hidden", 7), 1.0 / rate_hz / steps
     y = x[:2] + noise
-    tau = casadi.DM(KP) * (q_ref - y) + casadi.DM(KD) * (v_ref - (y - before) * RATE)
-    k1 = _rate(x, tau, hidden)
-    k2 = _rate(x + h / 2 * k1, tau, hidden)
-    k3 = _rate(x + h / 2 * k2, tau, hidden)
-    k4 = _rate(x + h * k3, tau, hidden)
-    after = casadi.vertcat(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), y)
+    tau = casadi.DM(gain * KP) * (q_ref - y) + casadi.DM(gain * KD) * (
+        v_ref - (y - before) * rate_hz
+    )
+    moved = x
+    for _ in range(steps):
+        k1 = _rate(moved, tau, hidden)
+        k2 = _rate(moved + h / 2 * k1, tau, hidden)
+        k3 = _rate(moved + h / 2 * k2, tau, hidden)
+        k4 = _rate(moved + h * k3, tau, hidden)
+        moved = moved + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    after = casadi.vertcat(moved, y)
     given = casadi.vertcat(q_ref, v_ref, noise, hidden)
     states, told = casadi.vertcat(x, before), casadi.vertcat(y, tau)
     return casadi.Function("sample", [states, given], [after, told]).mapaccum(samples)
@@ -200,10 +217,10 @@ def truth(model: Model) -> np.ndarray:
     return values
 
 
-def _references(waves: np.ndarray, t: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Reference positions and velocities, (S, T, 2) each."""
+def _references(waves: np.ndarray, t: np.ndarray, slowest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Reference positions and velocities, (S, T, 2) each, of five waves."""
     order = np.arange(1, 6)
-    w = 2 * np.pi / min(period, 8.0) * order
+    w = 2 * np.pi / slowest * order
     waves = waves * 0.5 / order
     sin, cos = np.sin(t[:, None] * w), np.cos(t[:, None] * w)
     q = np.einsum("tk,sjk->stj", sin, waves[:, 0]) + np.einsum("tk,sjk->stj", cos, waves[:, 1])

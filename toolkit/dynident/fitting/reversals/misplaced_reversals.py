@@ -154,6 +154,8 @@ def misplaced_note(dataset: Dataset, marked: Dataset) -> str:
     )
     each = zip(marked.recordings[0].joints, more.tolist(), strict=True)
     shares = [f"{joint} ({percent(share, 0)} of its rows)" for joint, share in each if share > 0]
+    if not shares:
+        return ""
     return (
         f"Around reversals of {listed(shares)} the filter of the positions and the sampling put "
         "dry friction at another moment than it acts, by enough to bias the fit: these rows do not "
