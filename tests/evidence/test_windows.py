@@ -51,12 +51,11 @@ def _effects(model: Model) -> list[Effect]:
 def test_windows_have_the_columns_that_each_has_alone() -> None:
     model = _model()
     recordings = _windows(0, model)
-    every = Dataset(recordings)
-    together = Evidence(model, gather(every))
+    together = Evidence(model, gather(Dataset(recordings)))
     values = np.linspace(1.0, 2.0, model.size)
     for effect in _effects(model):
         for run, recording in enumerate(recordings):
-            alone = Evidence(model, gather(replace(every, recordings=(recording,))))
+            alone = Evidence(model, gather(Dataset((recording,))))
             expected = alone.of(effect, 0, model, values)[0]
             found = together.of(effect, run, model, values)[0]
             assert np.allclose(found, expected, rtol=1e-12, atol=1e-12), effect.label

@@ -138,7 +138,6 @@ def test_a_fit_to_fewer_samples_is_the_same(noise: Noise | None) -> None:
 
 def test_an_answer_says_that_it_took_fewer_samples() -> None:
     for rate_hz, thinned in ((4000.0, True), (1000.0, False)):
-        data = Dataset((recording(rate_hz),), default_filter(rate_hz))
-        evidence = Evidence(model(), gather(data, samples_hz=1000.0))
+        evidence = Evidence(model(), gather(Dataset((recording(rate_hz),)), samples_hz=1000.0))
         notes = " ".join(notes_on(evidence, None, fit_evidence(evidence, model()), "replicates"))
         assert ("thinned to 1000 Hz" in notes) == ("thinned" in notes) == thinned

@@ -228,7 +228,7 @@ def test_the_bias_of_sampling_is_foreseen(settings):
     """Without noise the whole error is that of differences and held torques: known to 5 %."""
     dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=True, seconds=20.0), settings)
     model = loops.model(coulomb=True)
-    found = di.fit(model, dataset, IV(loops.LOOP))
+    found = IV(loops.LOOP).fit(model, dataset)  # of every row, those around reversals, too
     assert found.history is not None
     error, foreseen = found.values - loops.truth(model), found.history.sampling_bias
     assert np.linalg.norm(error - foreseen) < 0.05 * np.linalg.norm(error)
@@ -241,7 +241,7 @@ def test_differences_of_high_order_leave_less_of_that_bias():
     bias = []
     for order in (2, 8):
         data = replace(dataset, filter=replace(FILTERED, difference_order=order))
-        found = di.fit(model, data, IV(loops.LOOP))
+        found = IV(loops.LOOP).fit(model, data)
         bias.append(np.linalg.norm(found.values - loops.truth(model)))
     assert bias[1] < 0.6 * bias[0]
 

@@ -10,9 +10,12 @@ import pytest
 
 import dynident as di
 from dynident.fitting.reversals import joint_speeds, misplaced_reversals
-from dynident.fitting.reversals.misplaced_reversals import without_misplaced_reversals
+from dynident.fitting.reversals.misplaced_reversals import (
+    within_samples,
+    without_misplaced_reversals,
+)
 from dynident.fitting.sampling import sample
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, common_filter
 
 CARRIAGE = """<robot name="carriage"><link name="rail"/><link name="carriage"><inertial>
 <mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
@@ -66,7 +69,7 @@ def recorded(hz: float, force_std: float, seed: int) -> Dataset:
     rng = np.random.default_rng([seed, 1])
     force = command[:, seed] + force_std * rng.normal(size=len(t))
     one = Recording(t, q[:, [seed]], force[:, None], ("slider",), torque="held_command")
-    return Dataset((one.replace(window=(1.0, SECONDS)),))
+    return Dataset((one.replace(window=(1.0, SECONDS)),), common_filter([one]))
 
 
 def deviations(hz: float, force_std: float) -> np.ndarray:
@@ -124,10 +127,9 @@ def test_long_recordings_are_looked_at_part_by_part(monkeypatch) -> None:
 
 
 def test_the_mean_over_a_sample_is_that_of_a_steady_acceleration() -> None:
-    v = np.array([-0.3, -0.1, 0.02, 0.05, 0.05, 0.05, -1e-9, 4.0])[:, None]
-    friction = misplaced_reversals._Friction(np.ones(1), np.array([0.03]))
-    found = friction._within_samples(v)[:, 0]
+    v = np.array([-0.3, -0.1, 0.02, 0.05, 0.05, 0.05, -1e-9, 4.0])
+    found = within_samples(v, 0.03) + np.tanh(v / 0.03)
     for k in range(1, len(v) - 1):
-        steps = np.linspace(v[k - 1, 0] + v[k, 0], v[k, 0] + v[k + 1, 0], 20001) / 2.0
+        steps = np.linspace(v[k - 1] + v[k], v[k] + v[k + 1], 20001) / 2.0
         mean = np.trapezoid(np.tanh(steps / 0.03), dx=1.0 / 20000)
         assert found[k] == pytest.approx(mean, abs=1e-3 if k < 7 else 1e-2)

@@ -51,7 +51,7 @@ from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.model import Model
-from dynident.recording import Dataset
+from dynident.recording import Dataset, RowCount
 from dynident.recording.dataset import NoiseSource
 
 _SHOWN = 10
@@ -149,7 +149,7 @@ def assemble(
         criteria=evidence.criteria,
         impossible=impossible,
         withdrawn=path.withdrawn,
-        rows=rows_of_recordings(train if test is None else train + test),
+        rows=sum(map(rows_of_recordings, filter(None, (train, test))), RowCount()),
         limit=search.limit,
         detection_limits=limits,
         sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),

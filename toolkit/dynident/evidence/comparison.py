@@ -17,6 +17,10 @@ from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
+from dynident.fitting.reversals.misplaced_reversals import (
+    misplaced_note,
+    without_misplaced_reversals,
+)
 from dynident.fitting.reversals.standing_joints import standing_in, standing_note, without_stops
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.model import Model
@@ -43,6 +47,7 @@ class Comparison(Shown):
     wiring : columns and data that are not what the study says, where that was checked.
     standing : joints that stand, and how many of their rows therefore do not count; empty for
         none.
+    misplaced : joints whose reversals filter and sampling put at another moment; empty for none.
     fitted_to : recordings that an estimate was fitted to: there is no held-out error of these.
     """
 
@@ -53,6 +58,7 @@ class Comparison(Shown):
     criteria: Criteria = DEFAULTS
     wiring: tuple[Fault, ...] = ()
     standing: str = ""
+    misplaced: str = ""
     fitted_to: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -117,7 +123,7 @@ class Comparison(Shown):
         notes = (
             *notes,
             *mostly_noise(robot.names, shares),
-            *filter(None, (self.standing, self._seen_before)),
+            *filter(None, (self.standing, self.misplaced, self._seen_before)),
             *(f"Wiring: {fault.sentence}" for fault in self.wiring),
         )
         alone = len(self.names) == 1
@@ -183,6 +189,9 @@ def compare(
         raise FitError("no recording to compare with", remedy=remedy)
     standing = {joint for one in named.values() for joint in one.standing}
     dataset = without_stops([one.model for one in named.values()], dataset, standing)
+    marked = dataset
+    for estimate in named.values():
+        marked = without_misplaced_reversals(estimate, marked)
     runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
@@ -197,6 +206,7 @@ def compare(
         ),
         criteria=criteria,
         standing=standing_note(dataset),
+        misplaced=misplaced_note(dataset, marked, "is in this error, and not in the noise floor"),
         fitted_to=_fitted_to(named.values(), dataset),
     )
 

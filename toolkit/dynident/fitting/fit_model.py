@@ -9,7 +9,6 @@ from typing import ClassVar, Protocol
 from dynident.arguments import checked
 from dynident.clusters import Cluster, working_on
 from dynident.errors import FitError
-from dynident.fitting.consistent.constrained import Constrained
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.reversals.misplaced_reversals import fitted_without, misplaced_note
@@ -66,9 +65,9 @@ def fit(
 
     Shape parameters of effects are refined first, by variable projection; the linear parameters
     follow from the method. Rows around stops of joints that stand do not count, see
-    `Recording.stops`: no data tell their dry friction. Nor do, by least squares, constrained or
-    not, rows around reversals that the filter and the sampling put at another moment, where that
-    would bias the estimate.
+    `Recording.stops`: no data tell their dry friction. Nor do rows around reversals that the filter
+    and the sampling put at another moment, where that would bias the estimate: which they are
+    depends on the friction and the residual of a first fit, so that two models may count others.
 
     Parameters
     ----------
@@ -105,10 +104,7 @@ def fit(
 def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     dataset = without_stops(model, dataset)
     counted = dataset
-    if isinstance(method, LeastSquares | Constrained):
-        estimate, dataset = fitted_without(partial(_with_shapes, model, method=method), dataset)
-    else:  # instruments and noisy inputs allow for what reversals are seen through
-        estimate = _with_shapes(model, dataset, method)
+    estimate, dataset = fitted_without(partial(_with_shapes, model, method=method), dataset)
     if not isinstance(method, LeastSquares):  # which widens its sigma by what speaks against it
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
         said = (estimate.headline, judged.headline if judged is not None else "")
@@ -116,7 +112,7 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     notes = (
         standing_note(counted),
         too_wide_note(model, counted),
-        misplaced_note(counted, dataset),
+        misplaced_note(counted, dataset, "would bias the fit: these rows do not count in it"),
     )
     notes = (*estimate.notes, *filter(None, notes))
     return replace(estimate, notes=notes, standing=standing_in(counted))

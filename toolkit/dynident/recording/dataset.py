@@ -42,8 +42,9 @@ class Dataset:
     ----------
     recordings : in any number; unless the filter keeps the ends, their windows leave out where the
         robot stands still there, and a loop's transient before it repeats, see `usable`.
-    filter : by default `common_filter`, which suits the recordings; None, for `default_filter` at
-        each recording's rate, where their rates call for different ones.
+    filter : where there is none `fit`, `compare`, `diagnose` and the other verbs take
+        `common_filter`, which suits the recordings, or where their rates call for different ones
+        `default_filter` at the rate of each.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -61,8 +62,6 @@ class Dataset:
         if self.filter is None or self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
-        if self.filter is None and recordings:
-            object.__setattr__(self, "filter", common_filter(recordings))
         for recording in self.recordings[1:]:
             if recording.joints != self.recordings[0].joints:
                 ours = ", ".join(self.recordings[0].joints)
@@ -81,7 +80,7 @@ class Dataset:
 
     @staticmethod
     def of(data: Dataset | Recording, joints: Sequence[str]) -> Dataset:
-        """Return data as recordings of these joints; a single one takes the filter that suits it.
+        """Return data as recordings of these joints, see `of_joints`.
 
         Raises
         ------
@@ -94,6 +93,8 @@ class Dataset:
     def of_joints(self, joints: Sequence[str]) -> Dataset:
         """Return the recordings of these joints, in this order, which is that of a model's torques.
 
+        With the filter that suits them where none is stated.
+
         Raises
         ------
         RecordingError
@@ -101,7 +102,7 @@ class Dataset:
         """
         names = self.recordings[0].joints if self.recordings else tuple(joints)
         if names == tuple(joints):
-            return self
+            return self._suited()
         if missing := [joint for joint in joints if joint not in names]:
             raise RecordingError(
                 f"no joint '{missing[0]}', which the robot has; joints: {', '.join(names)}",
@@ -110,7 +111,14 @@ class Dataset:
             )
         picked = [names.index(joint) for joint in joints]
         noise = self.noise and Noise(self.noise.position_std[picked], self.noise.torque_std[picked])
-        return Dataset(tuple(one.select(joints) for one in self.recordings), self.filter, noise)
+        recordings = tuple(one.select(joints) for one in self.recordings)
+        return Dataset(recordings, self.filter, noise)._suited()
+
+    def _suited(self) -> Dataset:
+        """The same with a filter, unless different ones are called for."""
+        if self.filter is not None or not self.recordings:
+            return self
+        return replace(self, filter=common_filter(self.recordings))
 
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""

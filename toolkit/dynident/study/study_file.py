@@ -62,7 +62,7 @@ class FilterEntry(SettingsTable):
 
     position_cutoff_hz: Rate | Literal["default", "none"] = "default"
     """Zero-phase low-pass of q before it is differentiated; `"none"` for none. By default it
-    follows the sampling rate, and is two or four times as high where the encoders' noise permits:
+    follows the sampling rate, and is two to eight times as high where the encoders' noise permits:
     a low-pass shifts the instant at which dry friction turns round."""
     cutoff_hz: Rate | Literal["default", "none"] = "default"
     """The same low-pass on every column and on the torque; `"none"` for none. By default 0.45 of

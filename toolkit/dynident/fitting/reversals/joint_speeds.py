@@ -102,16 +102,22 @@ class JointSpeeds:
 
         return self.passed(within)
 
-    def passed(self, signal: Callable[[np.ndarray], np.ndarray]) -> Iterator[np.ndarray]:
+    def passed(
+        self, signal: Callable[[np.ndarray], np.ndarray], around: int = 0
+    ) -> Iterator[np.ndarray]:
         """Yield a function of the speeds, low-passed, in the rows that are used, part by part.
 
         Parameters
         ----------
         signal : of speeds (S, n) in consecutive samples, of the same shape.
+        around : samples on either side that show in it.
         """
         full = self._full
         for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
-            yield full.parallel.apply_block(signal(self._part(plan.raw)), plan)
+            first = max(0, plan.raw.start - around)
+            some = signal(self._part(slice(first, plan.raw.stop + around)))
+            kept = some[plan.raw.start - first :][: plan.raw.stop - plan.raw.start]
+            yield full.parallel.apply_block(kept, plan)
 
     def _largest_around(self, v: np.ndarray) -> np.ndarray:
         """Largest acceleration within a period of the positions' cut-off, (T, n)."""

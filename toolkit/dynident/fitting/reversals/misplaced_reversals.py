@@ -9,7 +9,7 @@ deviations where the noise is small. These rows of that joint do not count in a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,54 +20,91 @@ from dynident.fitting.reversals.joint_speeds import JointSpeeds
 from dynident.fitting.reversals.standing_joints import few_enough, resting, with_stops
 from dynident.fitting.sampling import Sampled, sample
 from dynident.recording import Dataset, Recording, lowpass, uniform
-from dynident.tables import listed, percent
+from dynident.tables import listed, number, percent
 
 _AGAIN = 2.4
 """What a low-pass moves a reversal by, over what it moves it further if it is passed once more:
 1 / (sqrt 2 - 1), as the variances of its response add up."""
 _MATTERS = 3.0
 """Friction's error over the noise, root of the sum of squares over all rows, from which a joint's
-reversals are left out. No parameter is off by more of its sigma than that: by a seventh of it, in
-simulated arms."""
+reversals are left out, and from which an estimate says that they bias it. No parameter is off by
+more of its sigma than that; by a seventh of it, in simulated arms."""
 _ROW = 0.1
 """The same in one row, from which it is left out."""
-_LEVELS = 2.0 ** np.arange(8)
-"""Multiples of that which are tried, so that enough rows are left."""
-_PADDED = 12
-"""Samples that the low-pass needs at least."""
+_FINE, _OCTAVES = 4, 40
+"""Parts of an octave to which the error is counted, and how many octaves above `_ROW`."""
+_AROUND, _PADDED = 64, 12
+"""Samples on either side of a part that show in the low-pass of its speeds by more than a
+thousandth, whatever the cut-off that suits a rate; and how many it needs at least."""
 _ALIKE = 1e-3
 """Change of speed within a sample over the friction width, below which its mean is its middle."""
+_FAST = 12.0
+"""Speed over the width, above which friction has turned to a billionth."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Friction:
-    """Dry friction of n joints: of a level and a width each, N m or N, and rad/s or m/s."""
+    """Dry friction of n joints, by Coulomb friction alone.
+
+    Attributes
+    ----------
+    level, width : (n,) N m or N, and rad/s or m/s.
+    """
 
     level: np.ndarray
     width: np.ndarray
 
+    @classmethod
+    def of(cls, estimate: Estimate) -> _Friction:
+        """Return what an estimate says of it; a level of zero where it says nothing."""
+        model = estimate.model
+        level = np.zeros(model.robot.n)
+        for j, joint in enumerate(model.robot.names):
+            place = model.slices.get(f"coulomb_friction@{joint}")
+            if place is not None:
+                level[j] = estimate.values[place.start]
+        return cls(level, np.array(model.friction_widths, dtype=float))
+
     def misplaced(self, sampled: Sampled) -> Iterator[np.ndarray]:
         """Yield its expected error in the rows that are used, (T, n) N m or N, part by part."""
-        speeds, rate = JointSpeeds(sampled), sampled.recording.rate_hz
-        cutoff = sampled.parallel.filter.position_cutoff_hz
+        rate, cutoff = sampled.recording.rate_hz, sampled.parallel.filter.position_cutoff_hz
+        some = np.flatnonzero(self.level)
 
-        def error(v: np.ndarray) -> np.ndarray:
-            direction = np.tanh(v / self.width)
-            found = self._within_samples(v) - direction
-            if cutoff and len(v) > _PADDED:
-                found += _AGAIN * (direction - np.tanh(lowpass(v, rate, cutoff) / self.width))
-            return self.level * found
+        def error(speeds: np.ndarray) -> np.ndarray:
+            found = np.zeros_like(speeds)
+            again = cutoff and len(speeds) > _PADDED
+            for j in some:
+                v, width = speeds[:, j], self.width[j]
+                seen = lowpass(v[:, None], rate, cutoff)[:, 0] if cutoff and again else v
+                off = within_samples(v, width) + _AGAIN * (turned(v, width) - turned(seen, width))
+                found[:, j] = self.level[j] * off
+            return found
 
-        return speeds.passed(error)
+        return JointSpeeds(sampled).passed(error, _AROUND)
 
-    def _within_samples(self, v: np.ndarray) -> np.ndarray:
-        """Mean direction over each sample's step, between the speeds in the middle of two."""
-        middle = (v[:-1] + v[1:]) / 2.0
-        begin, end = np.concatenate([v[:1], middle]), np.concatenate([middle, v[-1:]])
-        change, alike = end - begin, np.abs(end - begin) < _ALIKE * self.width
-        rise = self.width * (_log_cosh(end / self.width) - _log_cosh(begin / self.width))
-        mean = np.divide(rise, change, out=np.zeros_like(v), where=~alike)
-        return np.where(alike, np.tanh(v / self.width), mean)
+
+def turned(v: np.ndarray, width: float) -> np.ndarray:
+    """Return the direction of dry friction at speeds (T,), rad/s or m/s."""
+    return np.tanh(v / width)
+
+
+def within_samples(v: np.ndarray, width: float) -> np.ndarray:
+    """Return what the mean direction over each sample's step has more than that of its speed.
+
+    Parameters
+    ----------
+    v : (T,) speeds; between the middles of two steps they change steadily.
+    width : of the friction.
+    """
+    middle = (v[:-1] + v[1:]) / 2.0
+    begin, end = np.concatenate([v[:1], middle]), np.concatenate([middle, v[-1:]])
+    change, found = end - begin, np.zeros_like(v)
+    slow = np.abs(v) < _FAST * width + np.abs(change)
+    slow &= np.abs(change) > _ALIKE * width
+    begin, end, change = begin[slow], end[slow], change[slow]
+    rise = width * (_log_cosh(end / width) - _log_cosh(begin / width))
+    found[slow] = rise / change - turned(v[slow], width)
+    return found
 
 
 def _log_cosh(x: np.ndarray) -> np.ndarray:
@@ -82,12 +119,20 @@ def fitted_without(
 
     Parameters
     ----------
-    fit : by least squares, which is asked twice where there are any.
+    fit : that is asked twice where there are any.
     dataset : with them.
+
+    Returns
+    -------
+    The estimate says so where what is left of them still biases it.
     """
     estimate = fit(dataset)
     counted = without_misplaced_reversals(estimate, dataset)
-    return (estimate if counted is dataset else fit(counted)), counted
+    if counted is dataset:
+        return estimate, dataset
+    estimate = fit(counted)
+    headlines = (estimate.headline, _still_misplaced(estimate, counted))
+    return replace(estimate, headline=" ".join(filter(None, headlines))), counted
 
 
 def without_misplaced_reversals(estimate: Estimate, dataset: Dataset) -> Dataset:
@@ -98,82 +143,127 @@ def without_misplaced_reversals(estimate: Estimate, dataset: Dataset) -> Dataset
 
     Parameters
     ----------
-    estimate : of the dataset, whose friction and noise count.
-    dataset : what was fitted.
+    estimate : of the same robot, whose friction and noise count.
+    dataset : what was fitted, or is to be judged.
 
     Returns
     -------
     The same object where nothing is to be left out, or the filter keeps the ends.
     """
-    friction = _friction_of(estimate)
+    friction, std = _Friction.of(estimate), estimate.torque_std
     keeps = dataset.filter is not None and dataset.filter.ends == "keep"
     if keeps or not friction.level.any():
         return dataset
-    recordings, std = [uniform(one) for one in dataset.recordings], estimate.torque_std
-    limits = _LEVELS[:, None] * _ROW * std
-    power, beyond, moving = np.zeros(len(std)), np.zeros_like(limits), np.zeros(len(std))
-    for one in recordings:
-        sampled = sample(one, dataset.filter)
-        moving += np.sum(~resting(sampled), axis=0)
-        for error in friction.misplaced(sampled):
-            power += np.sum(error**2, axis=0)
-            beyond += [np.sum(np.abs(error) > limit, axis=0) for limit in limits]
-    chosen = np.argmax(beyond <= DEFAULTS.sticking.most * moving, axis=0)
+    recordings = tuple(uniform(one) for one in dataset.recordings)
+    least = np.where(std > 0, _ROW * std, np.inf)
+    errors = _counted(friction, recordings, dataset)
+    power, octaves = _spread(errors, least)
     which = power > (_MATTERS * std) ** 2
-    limit = np.where(which, limits[chosen, np.arange(len(std))], np.inf)
-    masks = [
-        np.concatenate([np.abs(error) > limit for error in friction.misplaced(sampled)])
-        for sampled in (sample(one, dataset.filter) for one in recordings)
-    ]
-    rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
-    which &= few_enough(np.concatenate(masks), rest, DEFAULTS.sticking)
     if not which.any():
         return dataset
+    rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
+    limit = least * _limits(octaves, DEFAULTS.sticking.most * np.sum(~rest, axis=0))
+    masks = []
+    for one in recordings:
+        parts = [np.abs(error) > limit for error in _counted(friction, [one], dataset)]
+        masks.append(np.concatenate(parts) & which)
+    which &= few_enough(np.concatenate(masks), rest, DEFAULTS.sticking)
     pairs = zip(recordings, masks, strict=True)
-    marked = [_marked(one, dataset, rows & which) for one, rows in pairs]
-    return replace(dataset, recordings=tuple(marked))
+    marked = [_marked(sample(one, dataset.filter), rows & which) for one, rows in pairs]
+    return replace(dataset, recordings=tuple(marked)) if which.any() else dataset
 
 
-def misplaced_note(dataset: Dataset, marked: Dataset) -> str:
-    """Say of which joints rows around reversals do not count, and how many; empty for none.
+def misplaced_note(dataset: Dataset, marked: Dataset, so: str) -> str:
+    """Say of which joints reversals are misplaced, and in how many rows; empty for none.
 
     Parameters
     ----------
     dataset, marked : before and after `without_misplaced_reversals`.
+    so : what follows from it, a clause.
+
+    Returns
+    -------
+    A sentence.
     """
     if marked is dataset:
         return ""
-    more = np.mean(
-        np.concatenate(
-            [
-                sample(one, dataset.filter).counting & ~sample(other, dataset.filter).counting
-                for one, other in zip(dataset.recordings, marked.recordings, strict=True)
-            ]
-        ),
-        axis=0,
-    )
-    each = zip(marked.recordings[0].joints, more.tolist(), strict=True)
-    shares = [f"{joint} ({percent(share, 0)} of its rows)" for joint, share in each if share > 0]
+    pairs = zip(dataset.recordings, marked.recordings, strict=True)
+    more = [
+        sample(one, dataset.filter).counting & ~sample(other, dataset.filter).counting
+        for one, other in pairs
+    ]
+    each = zip(marked.recordings[0].joints, np.concatenate(more).mean(axis=0).tolist(), strict=True)
+    shares = [f"{joint} ({percent(share, 1)} of its rows)" for joint, share in each if share > 0]
     if not shares:
         return ""
     return (
         f"Around reversals of {listed(shares)} the filter of the positions and the sampling put "
-        "dry friction at another moment than it acts, by enough to bias the fit: these rows do not "
-        "count in it."
+        f"dry friction at another moment than it acts, which {so}."
     )
 
 
-def _friction_of(estimate: Estimate) -> _Friction:
-    model = estimate.model
-    level = np.zeros(model.robot.n)
-    for j, joint in enumerate(model.robot.names):
-        place = model.slices.get(f"coulomb_friction@{joint}")
-        if place is not None:
-            level[j] = estimate.values[place.start]
-    return _Friction(level, np.array(model.friction_widths, dtype=float))
+def _still_misplaced(estimate: Estimate, dataset: Dataset) -> str:
+    """What is to be read before any number: reversals bias the estimate even so; empty if not."""
+    friction, std = _Friction.of(estimate), estimate.torque_std
+    recordings = tuple(uniform(one) for one in dataset.recordings)
+    power = sum(np.sum(error**2, axis=0) for error in _counted(friction, recordings, dataset))
+    rows = sum(np.sum(sample(one, dataset.filter).counting, axis=0) for one in recordings)
+    worse = np.flatnonzero(power > (_MATTERS * std) ** 2)
+    if not len(worse):
+        return ""
+    robot, off = estimate.model.robot, np.sqrt(power / np.maximum(rows, 1))
+    parts = [
+        f"{number(float(off[j]), 2)} {robot.torque_units[j]} at {robot.names[j]} "
+        f"(residual {number(float(std[j]), 2)})"
+        for j in worse
+    ]
+    return (
+        "Dry friction that reverses within a few samples is not known as well as the noise is "
+        f"small, though the worst rows are left out: about {listed(parts)}. sigma does not hold "
+        "that, and gives no 95 % intervals: record at a higher rate, or more slowly."
+    )
 
 
-def _marked(recording: Recording, dataset: Dataset, rows: np.ndarray) -> Recording:
+def _counted(
+    friction: _Friction, recordings: Iterable[Recording], dataset: Dataset
+) -> Iterator[np.ndarray]:
+    """Yield friction's error in the rows of recordings, (T, n), zero in those that do not count."""
+    for one in recordings:
+        sampled, first = sample(one, dataset.filter), 0
+        for error in friction.misplaced(sampled):
+            yield np.where(sampled.counting[first : first + len(error)], error, 0.0)
+            first += len(error)
+
+
+def _spread(errors: Iterable[np.ndarray], least: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of squares of errors (T, n), and how many lie in each part of an octave above `least`.
+
+    Parameters
+    ----------
+    errors : part by part.
+    least : (n,) error from which they are counted.
+
+    Returns
+    -------
+    (n,) and (n, `_OCTAVES` * `_FINE`).
+    """
+    places = _OCTAVES * _FINE
+    power, octaves = np.zeros(len(least)), np.zeros((len(least), places), dtype=int)
+    for error in errors:
+        power += np.sum(error**2, axis=0)
+        for j, found in enumerate(np.abs(error).T):
+            high = found[found > least[j]] / least[j]
+            octave = np.minimum(_FINE * np.log2(high), places - 1)
+            octaves[j] += np.bincount(octave.astype(int), minlength=places)
+    return power, octaves
+
+
+def _limits(octaves: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Error over the least, above which no more rows lie than may be left out, (n,)."""
+    above = np.cumsum(octaves[:, ::-1], axis=1)[:, ::-1]
+    return 2.0 ** (np.argmax(above <= most[:, None], axis=1) / _FINE)
+
+
+def _marked(sampled: Sampled, rows: np.ndarray) -> Recording:
     """A recording of which these rows (T, n) do not count, nor those that did not before."""
-    sampled = sample(recording, dataset.filter)
     return with_stops(sampled, rows | ~sampled.counting)

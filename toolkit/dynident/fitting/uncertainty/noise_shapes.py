@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from dynident.fitting.sampling import Sampled
+from dynident.recording.derivatives import difference_gain
 from dynident.recording.filters import butterworth
 from dynident.recording.low_pass.sections import response
 
@@ -52,7 +53,7 @@ def noise_shapes(sampled: Sampled, lags: int, edges: Sequence[float] = HALVING) 
         limit = 16 * top
     share = f / (top * (1 + 1e-9))
     spectra = [power * ((low <= share) & (share < high)) for low, high in pairwise(edges)]
-    slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
+    slope = difference_gain(2 * np.pi * f / rate, parallel.filter.order) ** 2
     spectra += [encoder * slope, encoder * slope**2]
     cosines = np.cos(2 * np.pi * np.outer(f / parallel.output_rate_hz, np.arange(lags + 1)))
     found = np.array(spectra) @ cosines

@@ -100,7 +100,7 @@ class NoisyPart:
         rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
         cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
         # Without a low-pass the true motion is sought behind one, and noise is added without.
-        behind = replace(settings, position_cutoff_hz=cutoff)
+        behind = replace(settings, position_cutoff_hz=cutoff, difference_order=settings.order)  # type: ignore[arg-type]
         whole = sample(recording, behind)
         recording, fewer = whole.recording, max(1, round(most / whole.parallel.step))
         sampled = _middle(whole, behind, model, fewer)
