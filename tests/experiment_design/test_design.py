@@ -44,8 +44,8 @@ EVERY_INSTANT = (
 )
 
 
-def recorded(model: Model = MODEL) -> Dataset:
-    values = true_values(model)
+def recorded(model: Model = MODEL, **effects: float) -> Dataset:
+    values = true_values(model, **effects)
     return Dataset((synthetic(model, values, 1, torque_std=0.05),))
 
 
@@ -164,8 +164,8 @@ def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
 def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
     base = Model(ROBOT) + "coulomb_friction"
     (first,), (second,) = (effects_of(label, ROBOT) for label in pair)
-    truth = base + first
-    data = recorded(truth)
+    hidden = {first.parameters(ROBOT)[0].name.replace("@", "__"): 0.3}
+    data = recorded(base + first, Fc__elbow=1.0, **hidden)
     task = DesignTask(duration=8.0, repeat=1, harmonics=5, tell=((first, second),), starts=1)
     found = design(base, data, task)
     (one,), program = found.separations, found.program
@@ -231,7 +231,7 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     )
     model = Model(ROBOT) + "coulomb_friction" + viscous + drag
     task = DesignTask(starts=1, harmonics=3, tell=((viscous, law), (drag, spring)))
-    found = design(model, recorded(model), task)
+    found = design(model, recorded(model, Fv__elbow=0.3, Fq__elbow=0.05), task)
     hopeless, told = found.separations
     assert hopeless.designed < 1e-3 < 1.0 < told.designed
     assert "No motion within the limits" in found.sentence

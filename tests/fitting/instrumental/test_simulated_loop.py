@@ -36,10 +36,10 @@ def test_without_noise_it_is_least_squares(coulomb, rate):
     loop = replace(loops.LOOP, rate_hz=rate)
     dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=coulomb, controller=loop))
     model = loops.model(coulomb=coulomb)
-    ours = di.fit(model, dataset, IV(loop, tolerance=TIGHT))
+    ours = IV(loop, tolerance=TIGHT).fit(model, dataset)  # both of every row
     window = _window(dataset, model)
     same = replace(dataset, recordings=tuple(r.replace(window=window) for r in dataset.recordings))
-    theirs = LeastSquares().fit(model, same)  # of every row: the instruments leave out none
+    theirs = LeastSquares().fit(model, same)
     assert ours.rows == theirs.rows
     # Each parameter by the torque that it makes, so that units do not decide.
     scale = theirs.basis.scale

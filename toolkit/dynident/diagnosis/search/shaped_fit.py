@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
@@ -9,6 +11,9 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 from dynident.model import Model
+
+_OFF = (0.96, 1.04)
+"""Times its value at which the column of what comes in bursts is taken, to begin again."""
 
 
 def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
@@ -54,10 +59,35 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
                 fitted = trial
         had, has = before.misfit(before), fitted.misfit(before)
         if had - has < criteria.gained * had + criteria.negligible * before.noise_known:
-            break
+            better = _from_other_values(evidence, fitted, driven)
+            if better.misfit(fitted) > (1.0 - criteria.gained) * fitted.misfit(fitted):
+                break
+            fitted = better
     for label in with_shapes:
         fitted = _of_the_time(evidence, fitted, label)
     return fitted
+
+
+def _from_other_values(
+    evidence: Evidence, fitted: EvidenceFit, labels: Sequence[str]
+) -> EvidenceFit:
+    """Return the best fit from columns taken at values a little off; as it is if none is better.
+
+    What comes in bursts changes by steps with its value, among which a search with derivatives
+    ends early.
+    """
+    best = fitted
+    for label in labels:
+        effect = next(e for e in fitted.model.effects if e.label == label)
+        if not effect.point:
+            continue
+        others = fit_evidence(evidence, fitted.model - effect, fitted)
+        for factor in _OFF:
+            begin = effect.at([factor * value for value in effect.point])
+            better = reshaped(evidence, others, fitted, begin).effect
+            trial = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
+            best = min((best, trial), key=lambda one: one.misfit(fitted))
+    return best
 
 
 def _of_the_time(evidence: Evidence, fitted: EvidenceFit, label: str) -> EvidenceFit:
