@@ -91,9 +91,9 @@ class Filter:
             f"parallel low-pass {self.cutoff_hz:g} Hz" if self.cutoff_hz else "",
             f"decimated to {self.rate_hz:g} Hz ({self.decimation})" if self.rate_hz else "",
             "ends kept" if self.ends == "keep" else "",
-            f"differences of order {self.difference_order}" if self.difference_order else "",
+            f"differences of order {self.order}",
         ]
-        return ", ".join(part for part in parts if part) or "none"
+        return ", ".join(part for part in parts if part)
 
     @property
     def order(self) -> int:

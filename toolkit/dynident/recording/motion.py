@@ -90,7 +90,7 @@ class MotionInParts:
     Attributes
     ----------
     recording : T samples, taken as uniformly sampled at its mean rate: see `uniform`.
-    filter : its `position_cutoff_hz`, `edge_s` and `ends` are used here.
+    filter : its `position_cutoff_hz`, `order`, `edge_s` and `ends` are used here.
 
     Raises
     ------
@@ -192,8 +192,7 @@ def differentiate(recording: Recording, filter: Filter) -> Motion:
     """Low-pass the positions, differentiate them twice, and drop the edges.
 
     Recorded v and a are not used, since columns and torque must have passed the same filters. A
-    held command acts from its sample to the next; central differences see the mean of both sides,
-    so that row k is (u[k-1] + u[k]) / 2; row 0, which has no predecessor, keeps u[0].
+    held command acts from its sample to the next: see `derivatives.held_torque`.
 
     Parameters
     ----------
