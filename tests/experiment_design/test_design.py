@@ -164,8 +164,8 @@ def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
 def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
     base = Model(ROBOT) + "coulomb_friction"
     (first,), (second,) = (effects_of(label, ROBOT) for label in pair)
-    hidden = {first.parameters(ROBOT)[0].name.replace("@", "__"): 0.3}
-    data = recorded(base + first, Fc__elbow=1.0, **hidden)
+    truth = base + first
+    data = recorded(truth, Fc__elbow=1.0, **{truth.names[-1].replace("@", "__"): 0.1})
     task = DesignTask(duration=8.0, repeat=1, harmonics=5, tell=((first, second),), starts=1)
     found = design(base, data, task)
     (one,), program = found.separations, found.program
