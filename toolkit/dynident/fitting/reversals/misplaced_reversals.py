@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -33,9 +34,9 @@ _ROW = 0.1
 """The same in one row, from which it is left out."""
 _FINE, _OCTAVES = 4, 40
 """Parts of an octave to which the error is counted, and how many octaves above `_ROW`."""
-_AROUND, _PADDED = 64, 12
-"""Samples on either side of a part that show in the low-pass of its speeds by more than a
-thousandth, whatever the cut-off that suits a rate; and how many it needs at least."""
+_AROUND, _PADDED = 3.0, 12
+"""Periods of the cut-off, on either side of a part, that show in the low-pass of its speeds by more
+than a thousandth; and samples that it needs at least."""
 _ALIKE = 1e-3
 """Change of speed within a sample over the friction width, below which its mean is its middle."""
 _FAST = 12.0
@@ -80,7 +81,8 @@ class _Friction:
                 found[:, j] = self.level[j] * off
             return found
 
-        return JointSpeeds(sampled).passed(error, _AROUND)
+        around = ceil(_AROUND * rate / cutoff) if cutoff else 1
+        return JointSpeeds(sampled).passed(error, around)
 
 
 def turned(v: np.ndarray, width: float) -> np.ndarray:
@@ -158,7 +160,7 @@ def without_misplaced_reversals(estimate: Estimate, dataset: Dataset) -> Dataset
     least = np.where(std > 0, _ROW * std, np.inf)
     errors = _counted(friction, recordings, dataset)
     power, octaves = _spread(errors, least)
-    which = power > (_MATTERS * std) ** 2
+    which = (power > (_MATTERS * std) ** 2) & (std > 0)
     if not which.any():
         return dataset
     rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
