@@ -99,6 +99,13 @@ def test_an_estimate_says_which_rows_it_left_out() -> None:
     assert noisy.rows > found.rows
 
 
+def test_what_is_left_of_them_is_the_first_thing_said() -> None:
+    """Of a motion so fast, and noise so small, that the rows that count are wrong, too."""
+    assert "reverses within" not in di.fit(model(), recorded(0.5, 0.05, 0)).headline
+    found = di.fit(model(), recorded(2.0, 1e-3, 0))
+    assert "gives no 95 % intervals" in found.headline and "N at slider" in found.headline
+
+
 @pytest.mark.parametrize("settings", [{"ends": "keep"}, {}])
 def test_a_recipe_and_a_noisy_recording_keep_every_row(settings) -> None:
     data = recorded(0.5, 20.0 if not settings else 0.05, 1)
