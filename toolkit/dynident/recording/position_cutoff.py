@@ -32,8 +32,9 @@ _WIDER = (1.0, 2.0, 4.0, 8.0)
 """Cut-offs that are tried, over the usual one. Columns and torque pass a far lower low-pass of
 their own, so that beyond these little is gained."""
 _OF_RATE = 0.404
-"""Of the sampling rate, the highest cut-off: there differences of eighth order still follow a
-derivative to 5 %. A hundredth more, for clocks that are rounded."""
+"""Of the sampling rate, the highest cut-off; a hundredth more, for clocks that are rounded. From a
+quarter of the rate on differences of eighth order fall short of a derivative, too: `SpeedGain` has
+what both leave."""
 _JUMP = 0.5
 """Jump of the acceleration where dry friction turns round, of its root mean square: with less the
 noise counts more, which is in every row."""
