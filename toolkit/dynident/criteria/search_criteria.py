@@ -168,6 +168,14 @@ class GateCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    block_matters: float = criterion(
+        0.01,
+        "1",
+        "part of what all blocks gain or lose from which a block counts where few of them tell: "
+        "gaps and stops show in bursts, and in the blocks between these nothing changes",
+        least=0,
+        most=1,
+    )
     not_identifiable: float = criterion(
         2e-3,
         "1",

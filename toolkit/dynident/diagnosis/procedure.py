@@ -299,10 +299,12 @@ def _seen_anew(stage: Stage, added: Stage) -> Stage:
 
 def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
     """Look through all shapes where a residual remains, and extend again with what was missed."""
-    if not task.most or start.loop.runs:
-        return extended  # simulated motions are renewed as the model grows: there is no way back
+    if not task.most:
+        return extended
     first = replace(start, rounds=extended.rounds[:1])
-    if extended.doubtful:  # both branches are to be judged on the same rows
+    if start.loop.runs:
+        first = extended  # simulated motions are renewed as the model grows: there is no way back
+    elif extended.doubtful:  # both branches are to be judged on the same rows
         start = left_out(start, extended.doubtful)
         first = _rank(replace(start, rounds=()), task)
     missed = global_search(first.ranked, extended.ranked, task.progress)

@@ -25,7 +25,14 @@ def says_what_it_is(kind: type[Effect]) -> Iterator[str]:
     known = catalogue()
     if kind.in_catalogue and known.get(kind.name) is not kind:
         yield f"'{kind.name}' is not in the catalogue"
-    for attribute in ("confounded_with", "contains", "stands_in_for", "requires", "beyond"):
+    for attribute in (
+        "confounded_with",
+        "contains",
+        "stands_in_for",
+        "excludes",
+        "requires",
+        "beyond",
+    ):
         for other in getattr(kind, attribute):
             if other not in known or other == kind.name:
                 yield f"{attribute} names '{other}', which is no other effect"

@@ -93,6 +93,8 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     stands_in_for: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns it has, or may seem to have: they are named first where they do
     most of the work."""
+    excludes: ClassVar[tuple[str, ...]] = ()
+    """Effects that no joint has beside it: a diagnosis asks for these no more at its joint."""
     requires: ClassVar[tuple[str, ...]] = ()
     """Labels of effects without which it makes no torque: a diagnosis asks for it beside them."""
     beyond: ClassVar[tuple[str, ...]] = ()

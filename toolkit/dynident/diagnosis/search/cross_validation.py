@@ -7,7 +7,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.special import bdtrc, ndtr
 
+from dynident.criteria import GateCriteria
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
@@ -45,6 +47,28 @@ def cross_validate(
 def left_out_losses(fitted: EvidenceFit) -> np.ndarray:
     """Return the squared residual of each block by the fit to all others, whitened, (B,)."""
     return _losses(fitted.moments, fitted.without_each_block)
+
+
+def helps_on_blocks(gains: np.ndarray, gates: GateCriteria) -> bool:
+    """Whether held-out residuals fall by more than chance makes them.
+
+    The sum is judged by its standard error, or the blocks by their signs. Where a few blocks hold
+    nearly all of it, its standard error says nothing, and the signs of the others are chance: the
+    sign test of those that matter then has the level of the standard errors asked for.
+
+    Parameters
+    ----------
+    gains : (B,) of the blocks' squared residuals, whitened.
+    gates : standard errors, share of the blocks, and which of them matter.
+    """
+    if not gains.sum() > 0:
+        return False
+    confident = gains.sum() > gates.standard_errors * gains.std(ddof=1) * np.sqrt(len(gains))
+    if confident or np.mean(gains > 0) >= gates.blocks_gaining:
+        return True
+    matter = gains[np.abs(gains) >= gates.block_matters * np.abs(gains).sum()]
+    by_chance = bdtrc(np.sum(matter > 0) - 1, len(matter), 0.5)
+    return bool(by_chance <= ndtr(-gates.standard_errors))
 
 
 def signed_rank(losses: np.ndarray, least: np.ndarray) -> float:

@@ -6,6 +6,9 @@ a generation in the same steps of time; all recordings are asked about the best 
 a link rattles, a wrong shape may fit one recording and no other: then it is sought on some at once.
 What tells a true one is that the value found is the one at which its column was taken, which no
 accident brings about.
+
+Where no noise is known, nothing tells what of a residual is unexplained, but for bursts: no noise
+makes them, and no response that is linear in a smooth motion. There gaps are sought.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.diagnosis.dependence.bursts import bursts_in
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
@@ -25,6 +29,7 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
 from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution, search
+from dynident.moments.replicates import Kind
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,50 +65,67 @@ def global_search(
     -------
     That of the two of whose residual it explains the larger share; None for none, or no need.
     """
-    criteria = last.evidence.criteria
-    if not last.fitted.noise_known or within_noise(
-        on_recordings(last.evidence, last.fitted), criteria.verdict
-    ):
-        return None
     sought = _sought(start, last)
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
     wrong = sought[0] in last.fitted.model or last.fitted is start.fitted
     bases = (start,) if wrong else (last, start)
-    part, searches = _worst_recordings(bases[0], 1), []
-    if not part[1].error_signal > 0:
-        return None
-    for effect in sought:
-        progress(f"{effect.label}, the global search")
-        searches.append(_shapes_on(*part, effect))
-    found = _finals(bases, searches)
-    most = max(range(len(sought)), key=lambda k: _fall(searches[k]))
-    alone = _fall(searches[most]) / part[1].error_signal
-    own = criteria.global_search
-    if alone > own.least and max((share for share, *_ in found), default=0.0) < own.holds * alone:
-        wider = _worst_recordings(bases[0], own.recordings)
-        progress(f"{sought[most].label}, the global search in {len(wider[0].runs)} recordings")
-        searches.append(_shapes_on(*wider, sought[most]))
-        found = _finals(bases, searches)
-    if not found:
+    searches: list[ShapeSolution[ScoreTrial]] = []
+    for base in bases:  # what was added may imitate a part of what is missing, and hide the rest
+        searches += _searched(bases, base, sought, progress)
+        if found := _finals(bases, searches):
+            break
+    else:
         return None
     _, one, base = max(found, key=lambda each: each[0])
     tests = base.ranking.tests + sum(each.evaluations for each in searches)
     best, refusal = judged(base.evidence, base.fitted, one, tests)
     if refusal:
         return None
-    return replace(base, ranking=_headed(base.ranking, best, tests, criteria.search.alike))
+    alike = last.evidence.criteria.search.alike
+    return replace(base, ranking=_headed(base.ranking, best, tests, alike))
+
+
+def _searched(
+    bases: Sequence[RankedModel],
+    base: RankedModel,
+    sought: Sequence[Effect],
+    progress: Callable[[str], None],
+) -> list[ShapeSolution[ScoreTrial]]:
+    """Search the shapes of each effect in what one of the models leaves of its worst recording."""
+    part = _worst_recordings(base, 1)
+    if not part[1].error_signal > 0:
+        return []
+    searches = []
+    for effect in sought:
+        progress(f"{effect.label}, the global search")
+        searches.append(_shapes_on(*part, effect))
+    most = max(range(len(sought)), key=lambda k: _fall(searches[k]))
+    alone = _fall(searches[most]) / part[1].error_signal
+    own, found = base.evidence.criteria.global_search, _finals(bases, searches)
+    if alone > own.least and max((share for share, *_ in found), default=0.0) < own.holds * alone:
+        wider = _worst_recordings(base, own.recordings)
+        progress(f"{sought[most].label}, the global search in {len(wider[0].runs)} recordings")
+        searches.append(_shapes_on(*wider, sought[most]))
+    return searches
 
 
 def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     """Effects of many shapes: those that were added with one that may be wrong, or else all.
 
     These only at joints with a part of what either model leaves: what gives way at a joint is felt
-    there, whatever the others feel of it.
+    there, whatever the others feel of it. Where the noise is unknown, gaps at joints with bursts.
     """
     model, evidence = start.fitted.model, last.evidence
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
+    trained, judging = on_recordings(evidence, last.fitted), evidence.criteria.verdict
+    if not last.fitted.noise_known:
+        names, units = model.robot.names, model.robot.torque_units
+        bursts = bursts_in(trained, names, units, judging)
+        return [one for one in every if one.joint in bursts and one.nonlinear]
+    if within_noise(trained, judging):
+        return []
     added = [one for one in every if one in last.fitted.model]
     if added:
         return added
@@ -176,16 +198,19 @@ def _worst_recordings(base: RankedModel, most: int) -> tuple[Evidence, EvidenceF
     evidence, fitted = base.evidence, base.fitted
     left = residuals(evidence, fitted.model, fitted.values)
     sizes = [
-        -1.0
-        if run.kind == "single"
-        else sum(
-            systematic_square(e[..., j], run.kind) / fitted.variances[j] for j in range(e.shape[-1])
-        )
+        float(np.sum(_square(e, run.kind, fitted.noise_known) / fitted.variances))
         for run, e in zip(evidence.runs, left, strict=True)
     ]
     worst = sorted(np.argsort(sizes)[::-1][:most])
     alone = evidence.with_runs(tuple(evidence.runs[k] for k in worst))
     return alone, fit_evidence(alone, fitted.model, fitted)
+
+
+def _square(residual: np.ndarray, kind: Kind, noise_known: bool) -> np.ndarray:
+    """Square (n,) of what is left of a run (P, S, n); -1 where others tell theirs from noise."""
+    if kind != "single":
+        return np.array([systematic_square(one, kind) for one in np.moveaxis(residual, -1, 0)])
+    return np.full(residual.shape[-1], -1.0) if noise_known else np.mean(residual[0] ** 2, axis=0)
 
 
 def _shapes_on(

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.criteria import SearchCriteria
 from dynident.diagnosis.search.candidate_shapes import refined
-from dynident.diagnosis.search.cross_validation import cross_validate
+from dynident.diagnosis.search.cross_validation import cross_validate, helps_on_blocks
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
 from dynident.diagnosis.search.scoring import (
     Score,
@@ -70,8 +70,9 @@ def candidates(model: Model) -> list[Effect]:
 
     Of those that require others, or refine others at their joint, the ones that have these in the
     model; of those that may be common to all joints, no more than there are joints: with them, one
-    more says nothing new.
+    more says nothing new. What an effect of the model excludes at its joint is not among them.
     """
+    excluded = {(one, effect.joint) for effect in model.effects for one in effect.excludes}
     found = []
     laws = (law_effect(law) for law in model.laws)
     for effect in (*catalogue().values(), *laws):
@@ -83,7 +84,9 @@ def candidates(model: Model) -> list[Effect]:
         found += [
             e.on(model.robot)
             for e in effect.candidates(model.robot)
-            if e not in model and all(f"{one}@{e.joint}" in model for one in e.beyond)
+            if e not in model
+            and (e.name, e.joint) not in excluded
+            and all(f"{one}@{e.joint}" in model for one in e.beyond)
         ]
     return found
 
@@ -304,7 +307,9 @@ def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> t
 
 
 def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
-    one = refined(evidence, fitted, one)
+    screened, one = one, refined(evidence, fitted, one)
+    # Each of the shapes tried is a test, and they are counted: the best of them is one, too.
+    one = replace(one, p_value=min(one.p_value, screened.p_value))
     (parts,) = candidate_moments(evidence, fitted, [one.effect])
     if one.payload_recordings is not None:
         parts = tuple(
@@ -339,9 +344,7 @@ def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, le
     gain = one.gains.sum() / max(float(np.sum(one.losses + one.gains)), 1e-300)
     if 0 < gain < gates.least_gain:
         return f"takes only {100 * gain:.2g} % off the held-out squared residual"
-    spread = one.gains.std(ddof=1) * np.sqrt(len(one.gains))
-    confident = one.gains.sum() > gates.standard_errors * spread
-    if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= gates.blocks_gaining)):
+    if not helps_on_blocks(one.gains, gates):
         return "does not help on held-out blocks"
     free = evidence.without_noise_in(one.effect)
     if free is not evidence:

@@ -40,6 +40,7 @@ class Backlash(FlexibleJoint):
     )
     confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
     stands_in_for = ("joint_elasticity",)  # whose sides bend far more than its gap is wide
+    excludes = ("joint_elasticity",)  # a joint has one transmission, and its sides are elastic
     shown_by = "load"
     experiment = "move {joint} so that its load changes sign slowly, many times"
     nonlinear = True

@@ -25,10 +25,14 @@ from dynident.fitting.least_squares import sources_of
 from dynident.fitting.linear_solution import residual_std
 from dynident.fitting.uncertainty.expected_bias import held, listed, reported
 from dynident.model import Model
+from dynident.tables import number
 
 _SURE = 10.0
 """Standard errors from which an expected bias is reported: the 99.5 % quantile of Student's t with
 the two degrees of freedom of three pairs."""
+_SHIFTED = 2.0
+"""Standard errors of a shift by sampling from which 95 % intervals hold the truth in less than
+half of all cases."""
 _WEAK = 0.02
 """Canonical correlation below which instruments and regressor hardly have to do with each other."""
 
@@ -82,6 +86,7 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
         rows=found.rows,
         method=method,
         status=history.sentence,
+        headline=_shifted_by_sampling(model, bias, history.sigma),
         notes=(*_doubted(noise), *_notes(model, solution, history, bias), *source.notes),
         sources=sources_of(source.measured),
         history=history,
@@ -177,6 +182,22 @@ def _notes(
             f"{listed(model, bias.sampling, clock)}."
         )
     return tuple(notes)
+
+
+def _shifted_by_sampling(model: Model, bias: ExpectedBias, sigma: np.ndarray) -> str:
+    """What is to be read before any number: sampling shifts the values by far more than sigma."""
+    shift = np.abs(bias.sampling)
+    shifted = np.flatnonzero(shift > _SHIFTED * sigma)
+    if not shifted.size:
+        return ""
+    most = shifted[np.argmax(shift[shifted] / sigma[shifted])]
+    return (
+        f"Sampling (central differences, held torques, filters) shifts {shifted.size} of "
+        f"{len(sigma)} parameters by more than {number(_SHIFTED, 2)} sigma, {model.names[most]} by "
+        f"{number(float(shift[most] / sigma[most]), 2)}: sigma does not hold that, and gives no "
+        "95 % intervals of these. Record at a higher rate, or take differences of higher order: "
+        "behind a low-pass of the positions they are, and where difference_order = 4 is stated."
+    )
 
 
 def _sure(bias: ExpectedBias) -> np.ndarray:
