@@ -120,3 +120,19 @@ def test_a_gap_that_is_given_is_refined() -> None:
     made = recordings(*truth("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3)))
     found = find(PLAIN + "backlash@shoulder", Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
     assert found.test_error.before < 0.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gap", "shape"), [(0.0008, (24.0, 0.5, 0.5)), (0.006, (38.0, 0.48, 0.54))]
+)
+def test_a_gap_is_found_by_its_bursts_where_no_noise_is_known(
+    gap: float, shape: tuple[float, float, float]
+) -> None:
+    made = [
+        one.replace(period=None) for one in recordings(*truth("backlash@shoulder", (gap,), shape))
+    ]
+    found = find(PLAIN, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
+    assert [step.effect.label for step in found.steps] == ["backlash@shoulder"]
+    assert found.steps[0].values[0] == pytest.approx(gap, rel=0.05)
+    assert found.test_error.after < 0.5 * found.test_error.before

@@ -36,3 +36,10 @@ def test_an_unbalance_is_asked_for_beside_a_tilt_at_vertical_axes_alone() -> Non
     assert asked(head, "unbalance") == asked(Model(arm()) + "base_tilt", "unbalance") == set()
     upright = [one.name for one in head.robot.joints if one.parent == -1]
     assert asked(head + "base_tilt", "unbalance") == {f"unbalance@{one}" for one in upright}
+
+
+def test_a_joint_with_a_gap_is_asked_for_no_elasticity() -> None:
+    gap = Model(arm()) + "backlash@shoulder"
+    assert asked(gap, "joint_elasticity") == {"joint_elasticity@elbow"}
+    spring = Model(arm()) + "joint_elasticity@shoulder"
+    assert asked(spring, "backlash") == {"backlash@shoulder", "backlash@elbow"}

@@ -235,6 +235,15 @@ def test_the_bias_of_sampling_is_foreseen(settings):
     assert any("Sampling" in note for note in found.notes)
 
 
+@pytest.mark.parametrize(("order", "said"), [(2, True), (4, False)])
+def test_values_that_sampling_shifts_beyond_sigma_come_with_a_warning_first(order, said):
+    noisy = loops.experiment(0, 1e-6, coulomb=False, seconds=20.0)
+    data = loops.dataset(noisy, Filter(difference_order=order))
+    found = di.fit(loops.model(coulomb=False), data, IV(loops.LOOP))
+    assert ("Sampling" in found.headline) is said
+    assert ("difference_order = 4" in str(found)) is said
+
+
 def test_differences_of_high_order_leave_less_of_that_bias():
     dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=True, seconds=20.0), FILTERED)
     model = loops.model(coulomb=True)

@@ -7,8 +7,8 @@ a link rattles, a wrong shape may fit one recording and no other: then it is sou
 What tells a true one is that the value found is the one at which its column was taken, which no
 accident brings about.
 
-Where no noise is known, nothing tells what of a residual is unexplained, but for bursts: no noise
-makes them, and no response that is linear in a smooth motion. There gaps are sought.
+Where no noise is known, nothing tells what of a residual is unexplained, but for bursts: noise
+seldom makes them, nor a response that is linear in a smooth motion. There gaps are sought.
 """
 
 from __future__ import annotations
@@ -122,7 +122,8 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     trained, judging = on_recordings(evidence, last.fitted), evidence.criteria.verdict
     if not last.fitted.noise_known:
         names, units = model.robot.names, model.robot.torque_units
-        bursts = bursts_in(trained, names, units, judging)
+        least = evidence.criteria.global_search.held_by_few
+        bursts = bursts_in(trained, names, units, replace(judging, held_by_few=least))
         return [one for one in every if one.joint in bursts and one.nonlinear]
     if within_noise(trained, judging):
         return []
