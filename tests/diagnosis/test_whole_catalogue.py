@@ -136,3 +136,15 @@ def test_a_gap_is_found_by_its_bursts_where_no_noise_is_known(
     assert [step.effect.label for step in found.steps] == ["backlash@shoulder"]
     assert found.steps[0].values[0] == pytest.approx(gap, rel=0.05)
     assert found.test_error.after < 0.5 * found.test_error.before
+
+
+@pytest.mark.slow
+def test_such_a_gap_is_kept_beside_another_effect() -> None:
+    hidden = truth("backlash@shoulder", (0.006,), (38.0, 0.48, 0.54))
+    made = [one.replace(period=None) for one in recordings(*hidden)]
+    model = PLAIN - effects_of("viscous_friction@elbow", PLAIN.robot)[0]
+    found = find(model, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
+    added = {step.effect.label for step in found.steps}
+    assert added == {"viscous_friction@elbow", "backlash@shoulder"}
+    (note,) = (one for one in found.notes if "not tried" in one)
+    assert note.startswith("Joint elasticity was not tried") and "Backlash was sought only" in note

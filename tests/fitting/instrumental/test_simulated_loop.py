@@ -14,7 +14,7 @@ from dynident.errors import DynidentError, FitError, SimulationError
 from dynident.fitting import IV, LeastSquares, SimulatedLoop
 from dynident.fitting.history import Ending
 from dynident.model import Model
-from dynident.recording import Dataset, Filter
+from dynident.recording import Dataset, Filter, Noise
 
 FILTERED = Filter(position_cutoff_hz=20.0, cutoff_hz=8.0, rate_hz=20.0)
 TIGHT = 1e-12
@@ -242,6 +242,13 @@ def test_values_that_sampling_shifts_beyond_sigma_come_with_a_warning_first(orde
     found = di.fit(loops.model(coulomb=False), data, IV(loops.LOOP))
     assert ("Sampling" in found.headline) is said
     assert ("difference_order = 4" in str(found)) is said
+
+
+def test_without_noise_there_is_no_sigma_to_be_shifted_by():
+    exact = Noise(np.zeros(2), np.zeros(2))
+    data = loops.dataset(loops.experiment(0, 0.0, seconds=20.0), Filter(difference_order=2))
+    found = di.fit(loops.model(coulomb=False), replace(data, noise=exact), IV(loops.LOOP))
+    assert "Sampling" not in found.headline
 
 
 def test_differences_of_high_order_leave_less_of_that_bias():

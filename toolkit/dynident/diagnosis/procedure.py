@@ -299,7 +299,7 @@ def _seen_anew(stage: Stage, added: Stage) -> Stage:
 
 def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
     """Look through all shapes where a residual remains, and extend again with what was missed."""
-    if not task.most:
+    if not task.most or (start.loop.runs and extended.fitted.noise_known):
         return extended
     first = replace(start, rounds=extended.rounds[:1])
     if start.loop.runs:

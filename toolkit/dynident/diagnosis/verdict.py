@@ -108,16 +108,31 @@ def notes_on_steps(steps: Sequence[Step], held: Evidence | None) -> tuple[str, .
 
 def _not_tried(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
     """Which effects plain least squares takes for the noise in its columns; empty for none."""
-    responses = (one for one in candidates(fitted.model) if one.is_dynamic_response)
-    names = list(dict.fromkeys(one.name.replace("_", " ") for one in responses))
-    if not names or not carries_noise(evidence):
+    if not carries_noise(evidence):
+        return []
+    robot = fitted.model.robot
+    responses = [one for one in candidates(fitted.model) if one.is_dynamic_response]
+    by_bursts = {one.name for one in responses if one.nonlinear and one.sought_in(robot)}
+    names = [
+        _spoken(one) for one in dict.fromkeys(r.name for r in responses) if one not in by_bursts
+    ]
+    if not names:
         return []
     were = "was" if len(names) == 1 else "were"
     return [
         f"{listed(names).capitalize()} {were} not tried: a joint that gives way looks like the "
         "noise in accelerations. A motion that repeats would show it, and `dynident compare STUDY "
         "--with EFFECT` how far the error falls with one, which that noise may bring about."
+        + "".join(
+            f" {_spoken(one).capitalize()} was sought only at joints where a few rows hold much of "
+            "what is left."
+            for one in sorted(by_bursts)
+        )
     ]
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def notes_on(

@@ -94,7 +94,7 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     """Simpler effects whose columns it has, or may seem to have: they are named first where they do
     most of the work."""
     excludes: ClassVar[tuple[str, ...]] = ()
-    """Effects that no joint has beside it: a diagnosis asks for these no more at its joint."""
+    """Effects that a diagnosis asks for no more at its joint, once it is in the model."""
     requires: ClassVar[tuple[str, ...]] = ()
     """Labels of effects without which it makes no torque: a diagnosis asks for it beside them."""
     beyond: ClassVar[tuple[str, ...]] = ()

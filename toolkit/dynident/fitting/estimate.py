@@ -83,7 +83,7 @@ class Estimate(Shown):
     history : the iterations of an instrumental variable estimate.
     details : tables of what else the method has to say.
     sigma_words : what the standard deviations hold, where the method has its own.
-    headline : what is to be read before any number: that the model is rejected; empty if it is not.
+    headline : what is to be read before any number, that the model is rejected, say; or empty.
     shapes : parameters inside effects, as they were found.
     trading_off : names of parameters of which the data tell no size, because another shape of their
         effect with another size does the same.

@@ -145,9 +145,9 @@ class Fleet(Shown):
                 "Parameters inside effects (widths, velocities) were refined robot by robot and "
                 "are not compared; what they do to the others counts as spread."
             )
-        rejected = [name for name, one in self.estimates.items() if one.headline]
-        if rejected:
-            said.append(f"The model lacks something, see their estimates: {', '.join(rejected)}.")
+        warned = [name for name, one in self.estimates.items() if one.headline]
+        if warned:
+            said.append(f"Estimates with a warning, their first line: {', '.join(warned)}.")
         return tuple(said)
 
     def parameter_table(self) -> Table:

@@ -52,9 +52,9 @@ def left_out_losses(fitted: EvidenceFit) -> np.ndarray:
 def helps_on_blocks(gains: np.ndarray, gates: GateCriteria) -> bool:
     """Whether held-out residuals fall by more than chance makes them.
 
-    The sum is judged by its standard error, or the blocks by their signs. Where a few blocks hold
-    nearly all of it, its standard error says nothing, and the signs of the others are chance: the
-    sign test of those that matter then has the level of the standard errors asked for.
+    The sum is judged by its standard error, or the blocks by their signs; or, as where few blocks
+    hold nearly all of the sum, its standard error says nothing and the signs of the others are
+    chance, those that matter by a sign test of at most the level of the standard errors asked for.
 
     Parameters
     ----------

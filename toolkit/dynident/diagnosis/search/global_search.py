@@ -28,8 +28,8 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
+from dynident.evidence.runs import Run
 from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution, search
-from dynident.moments.replicates import Kind
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,42 +73,46 @@ def global_search(
     bases = (start,) if wrong else (last, start)
     searches: list[ShapeSolution[ScoreTrial]] = []
     for base in bases:  # what was added may imitate a part of what is missing, and hide the rest
-        searches += _searched(bases, base, sought, progress)
-        if found := _finals(bases, searches):
-            break
-    else:
-        return None
-    _, one, base = max(found, key=lambda each: each[0])
-    tests = base.ranking.tests + sum(each.evaluations for each in searches)
-    best, refusal = judged(base.evidence, base.fitted, one, tests)
-    if refusal:
-        return None
-    alike = last.evidence.criteria.search.alike
-    return replace(base, ranking=_headed(base.ranking, best, tests, alike))
+        searches, found = _searched(bases, base, sought, searches, progress)
+        if not found:
+            continue
+        _, one, better = max(found, key=lambda each: each[0])
+        tests = better.ranking.tests + sum(each.evaluations for each in searches)
+        best, refusal = judged(better.evidence, better.fitted, one, tests)
+        if not refusal:
+            alike = last.evidence.criteria.search.alike
+            return replace(better, ranking=_headed(better.ranking, best, tests, alike))
+    return None
 
 
 def _searched(
     bases: Sequence[RankedModel],
     base: RankedModel,
     sought: Sequence[Effect],
+    earlier: Sequence[ShapeSolution[ScoreTrial]],
     progress: Callable[[str], None],
-) -> list[ShapeSolution[ScoreTrial]]:
-    """Search the shapes of each effect in what one of the models leaves of its worst recording."""
+) -> tuple[list[ShapeSolution[ScoreTrial]], list[tuple[float, Score, RankedModel]]]:
+    """Search the shapes of each effect in what one of the models leaves of its worst recording.
+
+    Returns all searches, with the earlier ones, and the best of them for each of the models.
+    """
     part = _worst_recordings(base, 1)
     if not part[1].error_signal > 0:
-        return []
+        return list(earlier), _finals(bases, earlier)
     searches = []
     for effect in sought:
         progress(f"{effect.label}, the global search")
         searches.append(_shapes_on(*part, effect))
     most = max(range(len(sought)), key=lambda k: _fall(searches[k]))
     alone = _fall(searches[most]) / part[1].error_signal
+    searches = [*earlier, *searches]
     own, found = base.evidence.criteria.global_search, _finals(bases, searches)
     if alone > own.least and max((share for share, *_ in found), default=0.0) < own.holds * alone:
         wider = _worst_recordings(base, own.recordings)
         progress(f"{sought[most].label}, the global search in {len(wider[0].runs)} recordings")
         searches.append(_shapes_on(*wider, sought[most]))
-    return searches
+        found = _finals(bases, searches)
+    return searches, found
 
 
 def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
@@ -124,7 +128,8 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
         names, units = model.robot.names, model.robot.torque_units
         least = evidence.criteria.global_search.held_by_few
         bursts = bursts_in(trained, names, units, replace(judging, held_by_few=least))
-        return [one for one in every if one.joint in bursts and one.nonlinear]
+        every = [one for one in every if one.joint in bursts and one.nonlinear]
+        return [one for one in every if one in last.fitted.model] or every
     if within_noise(trained, judging):
         return []
     added = [one for one in every if one in last.fitted.model]
@@ -148,7 +153,7 @@ def _felt(fitted: EvidenceFit) -> np.ndarray:
 
 
 def _finals(
-    bases: Sequence[RankedModel], searches: list[ShapeSolution[ScoreTrial]]
+    bases: Sequence[RankedModel], searches: Sequence[ShapeSolution[ScoreTrial]]
 ) -> list[tuple[float, Score, RankedModel]]:
     """The best of what was found for each model, and its share of what that model leaves."""
     every = [
@@ -164,7 +169,7 @@ def _finals(
 
 
 def _final(
-    evidence: Evidence, fitted: EvidenceFit, searches: list[ShapeSolution[ScoreTrial]]
+    evidence: Evidence, fitted: EvidenceFit, searches: Sequence[ShapeSolution[ScoreTrial]]
 ) -> Score | None:
     """The best of what was found on one recording, by all of them; None if it explains little."""
     scores = [
@@ -198,20 +203,25 @@ def _worst_recordings(base: RankedModel, most: int) -> tuple[Evidence, EvidenceF
     """Recordings with most systematic residual over noise, and the model as they alone fit it."""
     evidence, fitted = base.evidence, base.fitted
     left = residuals(evidence, fitted.model, fitted.values)
-    sizes = [
-        float(np.sum(_square(e, run.kind, fitted.noise_known) / fitted.variances))
-        for run, e in zip(evidence.runs, left, strict=True)
-    ]
+    sizes = [_size(*each, fitted) for each in zip(evidence.runs, left, strict=True)]
     worst = sorted(np.argsort(sizes)[::-1][:most])
     alone = evidence.with_runs(tuple(evidence.runs[k] for k in worst))
     return alone, fit_evidence(alone, fitted.model, fitted)
 
 
-def _square(residual: np.ndarray, kind: Kind, noise_known: bool) -> np.ndarray:
-    """Square (n,) of what is left of a run (P, S, n); -1 where others tell theirs from noise."""
-    if kind != "single":
-        return np.array([systematic_square(one, kind) for one in np.moveaxis(residual, -1, 0)])
-    return np.full(residual.shape[-1], -1.0) if noise_known else np.mean(residual[0] ** 2, axis=0)
+def _size(run: Run, residual: np.ndarray, fitted: EvidenceFit) -> float:
+    """What is left of a run (P, S, n) over the noise; nothing of one that does not tell its own."""
+    if run.kind == "single" and fitted.noise_known:
+        return -np.inf
+    size = 0.0
+    for j, variance in enumerate(fitted.variances.tolist()):
+        versions = residual[..., j]
+        if run.kind == "single":
+            certain = versions[0, run.certain(j)]
+            size += float(np.sum(certain**2)) / (max(len(certain), 1) * variance)
+        else:
+            size += systematic_square(versions, run.kind) / variance
+    return size
 
 
 def _shapes_on(

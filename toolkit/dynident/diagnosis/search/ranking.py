@@ -132,7 +132,8 @@ def rank(
         below_noise = joints_below_noise(evidence, fitted)
     for effect in asked:
         driven = effect.is_dynamic_response
-        if driven and (noisy or effect.joint in below_noise):
+        found_before = bool(effect.point)  # by its bursts, which noise does not make
+        if driven and ((noisy and not found_before) or effect.joint in below_noise):
             best.append(Score(effect=effect, payload_recordings=None, not_identifiable=False))
             continue
         progress(effect.label)
@@ -308,7 +309,7 @@ def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> t
 
 def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
     screened, one = one, refined(evidence, fitted, one)
-    # Each of the shapes tried is a test, and they are counted: the best of them is one, too.
+    # The shape that was screened is one of the tests that are counted; it may be told better.
     one = replace(one, p_value=min(one.p_value, screened.p_value))
     (parts,) = candidate_moments(evidence, fitted, [one.effect])
     if one.payload_recordings is not None:

@@ -187,8 +187,8 @@ def _caveats(before: Estimate, after: Estimate, labels: Sequence[str]) -> tuple[
         )
     if before.headline or after.headline:
         found.append(
-            "A model is rejected: what it lacks may differ between the two motions, and show as a "
-            "change that is none."
+            "An estimate comes with a warning, its first line: what is wrong may differ between "
+            "the two motions, and show as a change that is none."
         )
     if any(one.takes_rows_as_independent for one in (before, after)):
         found.append(

@@ -25,6 +25,8 @@ from dynident.fitting.least_squares import sources_of
 from dynident.fitting.linear_solution import residual_std
 from dynident.fitting.uncertainty.expected_bias import held, listed, reported
 from dynident.model import Model
+from dynident.recording import Filter
+from dynident.recording.derivatives import ORDERS
 from dynident.tables import number
 
 _SURE = 10.0
@@ -86,7 +88,7 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
         rows=found.rows,
         method=method,
         status=history.sentence,
-        headline=_shifted_by_sampling(model, bias, history.sigma),
+        headline=_shifted_by_sampling(source.measured.filter, bias, history),
         notes=(*_doubted(noise), *_notes(model, solution, history, bias), *source.notes),
         sources=sources_of(source.measured),
         history=history,
@@ -184,19 +186,21 @@ def _notes(
     return tuple(notes)
 
 
-def _shifted_by_sampling(model: Model, bias: ExpectedBias, sigma: np.ndarray) -> str:
+def _shifted_by_sampling(filter: Filter | None, bias: ExpectedBias, history: Convergence) -> str:
     """What is to be read before any number: sampling shifts the values by far more than sigma."""
-    shift = np.abs(bias.sampling)
-    shifted = np.flatnonzero(shift > _SHIFTED * sigma)
+    shift, sigma = np.abs(bias.sampling), history.sigma
+    shifted = np.flatnonzero((sigma > 0) & (shift > _SHIFTED * sigma))
     if not shifted.size:
         return ""
     most = shifted[np.argmax(shift[shifted] / sigma[shifted])]
+    remedy = "Record at a higher rate."
+    if filter is not None and filter.order == ORDERS[0]:
+        remedy = "Differences of fourth order (difference_order = 4 in the filter) shift them less."
     return (
-        f"Sampling (central differences, held torques, filters) shifts {shifted.size} of "
-        f"{len(sigma)} parameters by more than {number(_SHIFTED, 2)} sigma, {model.names[most]} by "
+        f"Sampling shifts {shifted.size} of {len(sigma)} parameters by more than "
+        f"{number(_SHIFTED, 2)} sigma, {history.names[most]} by "
         f"{number(float(shift[most] / sigma[most]), 2)}: sigma does not hold that, and gives no "
-        "95 % intervals of these. Record at a higher rate, or take differences of higher order: "
-        "behind a low-pass of the positions they are, and where difference_order = 4 is stated."
+        f"95 % intervals of these. {remedy}"
     )
 
 
