@@ -89,7 +89,7 @@ def test_it_is_fitting_first_and_projecting_under_the_metric(
     model, truth, consistency, distance
 ) -> None:
     """To rounding: X'X and the least-squares estimate are all that data say."""
-    data = poor(model, truth, 3)
+    data = poor(model, truth, 3).of_joints(model.robot.names)
     within, prior = Within(consistency), Prior(model.robot, distance, 3.0)
     direct = fit(model, data, Constrained(within, prior, weighting="none"))
     free = fit(model, data, LeastSquares("none"))
@@ -209,7 +209,7 @@ def test_it_is_compared_with_projecting_later(constrained: Estimate) -> None:
 
 
 def test_weighting_none_takes_joints_as_equally_noisy(model, truth) -> None:
-    data = poor(model, truth, 3)
+    data = poor(model, truth, 3).of_joints(model.robot.names)
     plain = fit(model, data, Constrained(weighting="none"))
     weighted = fit(model, data, Constrained())
     assert plain.certificate is not None and plain.certificate.optimal

@@ -60,6 +60,7 @@ from dynident.recording.position_cutoff import (
     suited_filter,
     suited_position_cutoff,
     usual_position_cutoffs,
+    with_suited_order,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
 from dynident.recording.repetition import as_points, turning_round, turns_between
@@ -136,6 +137,7 @@ __all__ = [
     "usual_position_cutoffs",
     "warn_of_limited_torque",
     "warn_of_missing_torque",
+    "with_suited_order",
     "within",
     "within_limits",
     "without_ends",

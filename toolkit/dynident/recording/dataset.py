@@ -11,7 +11,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
-from dynident.recording.position_cutoff import common_filter
+from dynident.recording.position_cutoff import common_filter, with_suited_order
 from dynident.recording.recording import Recording
 from dynident.recording.usable_rows import usable
 
@@ -44,7 +44,8 @@ class Dataset:
         robot stands still there, and a loop's transient before it repeats, see `usable`.
     filter : where there is none `fit`, `compare`, `diagnose` and the other verbs take
         `common_filter`, which suits the recordings, or where their rates call for different ones
-        `default_filter` at the rate of each.
+        `default_filter` at the rate of each. One that has no low-pass of the positions gets the
+        order of differences that suits them, see `with_suited_order`.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -116,8 +117,10 @@ class Dataset:
 
     def _suited(self) -> Dataset:
         """The same with a filter, unless different ones are called for."""
-        if self.filter is not None or not self.recordings:
+        if not self.recordings:
             return self
+        if self.filter is not None:
+            return replace(self, filter=with_suited_order(self.filter, self.recordings))
         return replace(self, filter=common_filter(self.recordings))
 
     def __add__(self, other: Dataset) -> Dataset:

@@ -100,7 +100,8 @@ class Filter:
         """Order of accuracy of the differences.
 
         Where none is stated 8 behind a low-pass of the positions, and 2 without: the higher it is,
-        the more of the noise near half the sampling rate it lets through.
+        the more of the noise near half the sampling rate it lets through. Without a low-pass a
+        dataset states the one that suits its recordings, see `with_suited_order`.
         """
         return self.difference_order or (ORDERS[-1] if self.position_cutoff_hz else ORDERS[0])
 

@@ -1,8 +1,11 @@
-"""The low-pass of the positions that does least harm to their speeds.
+"""The low-pass of the positions that does least harm to their speeds, and differences without one.
 
 What it lets through of the encoders' noise is in every row. What it takes away is missing where dry
 friction turns round: there the acceleration jumps, behind a low-pass the speed passes through zero
 smoothly and at another time, and friction of a wrong sign is the larger error of a fine encoder.
+
+Where positions pass no low-pass the order of the differences is what is chosen. Differences of
+second order make every acceleration too small, those of a higher one let more noise through.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from dynident.errors import RecordingError
-from dynident.recording.derivatives import central_difference, difference_gain
+from dynident.recording.derivatives import ORDERS, central_difference, difference_gain
 from dynident.recording.filters import (
     Filter,
     butterworth,
@@ -45,6 +48,10 @@ _LEAST = 400  # samples of a part that is looked at
 _MOVES = 20.0  # range of a joint that moves over the noise of its positions
 _NOISE_RATE = 5.0
 """Rate down to which noise is looked for, over the usual cut-off."""
+_UNKNOWN = 0.3
+"""Share of the bias by noise that a fit cannot foretell. It foretells none by short differences."""
+_TURN = np.linspace(0.0, np.pi, _FREQUENCIES)[1:]
+"""Angles per sample at which a filter's response is taken, rad."""
 DIGITS = 1e-12
 """Of a position's size, that its low-pass keeps: some joints stand exactly."""
 
@@ -82,11 +89,10 @@ class SpeedGain:
     @cached_property
     def _gain(self) -> tuple[np.ndarray, np.ndarray]:
         """Angles up to pi, and there the gain from positions to speeds, per sample."""
-        angle = np.linspace(0.0, np.pi, _FREQUENCIES)[1:]
-        gain, cutoff = difference_gain(angle, self.filter.order), self.filter.position_cutoff_hz
+        gain, cutoff = difference_gain(_TURN, self.filter.order), self.filter.position_cutoff_hz
         if cutoff:
-            gain = gain * np.abs(response(butterworth(self.rate_hz, cutoff), angle)) ** 2
-        return angle, gain
+            gain = gain * np.abs(response(butterworth(self.rate_hz, cutoff), _TURN)) ** 2
+        return _TURN, gain
 
 
 def usual_position_cutoffs(rate_hz: float, cutoff_hz: float | None) -> tuple[float, ...]:
@@ -157,6 +163,33 @@ def suited_filter(recordings: Sequence[Recording]) -> Filter:
     return replace(usual, position_cutoff_hz=suited_position_cutoff(recordings, usual.cutoff_hz))
 
 
+def with_suited_order(filter: Filter, recordings: Sequence[Recording]) -> Filter:
+    """Return the filter with the order of its differences, where it leaves both to be chosen.
+
+    Parameters
+    ----------
+    filter : one that states an order, filters positions, or keeps the ends, as published recipes
+        do, comes back as it is.
+    recordings : all that pass it.
+
+    Returns
+    -------
+    With the order that makes the error of inertias by least squares smallest: what noise of the
+    accelerations takes off them, its variance over that of the motion, and what differences fall
+    short. In the geometric mean over joints, while they move.
+    """
+    if filter.difference_order or filter.position_cutoff_hz or filter.ends == "keep":
+        return filter
+    try:
+        every = ((q, one.rate_hz) for one in recordings for q in _parts(one))
+        errors = [_errors_of_orders(q, rate, filter.cutoff_hz) for q, rate in every]
+    except RecordingError:  # which whoever samples the recording will tell, with its place
+        return filter
+    if not errors:
+        return filter
+    return replace(filter, difference_order=ORDERS[int(np.argmin(np.sum(errors, axis=0)))])
+
+
 def _parts(recording: Recording) -> list[np.ndarray]:
     """Positions (T, n) in parts of the recording, within its window."""
     low, high = recording.window or (-np.inf, np.inf)
@@ -177,7 +210,10 @@ def _errors(q: np.ndarray, rate_hz: float, cutoffs: Sequence[float]) -> np.ndarr
     rate_hz : of the samples.
     cutoffs : the first is the usual one.
     """
-    noise = _noise(q, rate_hz, cutoffs[0])
+    # Of what a drive has filtered before it was recorded little is left near half the rate of the
+    # samples: the largest noise that is seen at any rate at which a motion is still smooth.
+    slowest = max(1, int(rate_hz / (_NOISE_RATE * cutoffs[0])))
+    noise = _noise(q, [2**k for k in range(slowest.bit_length())])
     gains = [SpeedGain(rate_hz, Filter(position_cutoff_hz=one)) for one in cutoffs]
     moves = np.ptp(q, axis=0) > _MOVES * noise
     v = central_difference(lowpass(q, rate_hz, cutoffs[0]), rate_hz)
@@ -186,14 +222,44 @@ def _errors(q: np.ndarray, rate_hz: float, cutoffs: Sequence[float]) -> np.ndarr
     return np.sum(np.log(np.array(squares)[:, moves]), axis=1)
 
 
-def _noise(q: np.ndarray, rate_hz: float, usual_hz: float) -> np.ndarray:
+def _errors_of_orders(q: np.ndarray, rate_hz: float, cutoff_hz: float | None) -> np.ndarray:
+    """Logarithms of the errors of inertias with differences of each order, over joints that move.
+
+    Parameters
+    ----------
+    q : (T, n) positions.
+    rate_hz : of the samples.
+    cutoff_hz : of columns and torque, if there is one.
+    """
+    usual = default_position_cutoff(rate_hz, cutoff_hz)
+    # What is left of noise near half the sampling rate is what differences magnify.
+    noise, smooth = _noise(q, (1,)), lowpass(q, rate_hz, usual)
+    moves = np.ptp(q, axis=0) > _MOVES * noise
+    passed = np.ones_like(_TURN)
+    if cutoff_hz and cutoff_hz < rate_hz / 2:
+        passed = np.abs(response(butterworth(rate_hz, cutoff_hz), _TURN)) ** 2
+
+    def twice(x: np.ndarray, order: int) -> np.ndarray:
+        return central_difference(central_difference(x, rate_hz, order), rate_hz, order)
+
+    best, errors = twice(smooth, ORDERS[-1]), []
+    size = np.mean(best**2, axis=0)
+    for order in ORDERS:
+        gain = rate_hz**2 * difference_gain(_TURN, order) ** 2 * passed
+        noisy = noise**2 * np.trapezoid(gain**2, _TURN) / np.pi
+        short = np.mean((twice(smooth, order) - best) * best, axis=0)
+        errors.append(np.log((_UNKNOWN * noisy + np.abs(short))[moves] / size[moves]).sum())
+    return np.array(errors)
+
+
+def _noise(q: np.ndarray, every: Sequence[int]) -> np.ndarray:
     """Standard deviation of the noise in positions, (n,) rad or m.
 
-    The largest that is seen at any rate at which a motion is still smooth: of what a drive has
-    filtered before it was recorded little is left near half the rate of the samples.
+    Parameters
+    ----------
+    q : (T, n).
+    every : the largest noise counts that is seen in every k-th of them, for these k.
     """
-    slowest = max(1, int(rate_hz / (_NOISE_RATE * usual_hz)))
-    every = [2**k for k in range(slowest.bit_length())]
     seen = [encoder_noise_std(q[::k]) for k in every]
     steps = resolution(q) / np.sqrt(12.0)
     return np.max([*seen, steps, DIGITS * np.abs(q).max(axis=0)], axis=0)

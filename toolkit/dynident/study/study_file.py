@@ -80,8 +80,9 @@ class FilterEntry(SettingsTable):
     """`"drop"` leaves out what filters make up at the ends, `"keep"` uses all of the record."""
     difference_order: Literal[2, 4, 6, 8] | None = None
     """Order of accuracy of the central differences of positions, and of the torque that held
-    commands make. By default 8 behind a low-pass of the positions, 2 without. Published recipes
-    mostly have 2, with which accelerations at 2 Hz and 100 samples a second are 0.5 % too small."""
+    commands make. By default 8 behind a low-pass of the positions; without one as the noise of the
+    encoders allows, and 2 with `ends = "keep"`. Published recipes mostly have 2, with which
+    accelerations at 2 Hz and 100 samples a second are 0.5 % too small."""
 
 
 class NoiseEntry(SettingsTable):

@@ -30,6 +30,8 @@ from dynident.robot import Robot
 from dynident.tables import percent
 from dynident.threads import single_threaded
 
+_DIGITS = 1e-5  # of a torque's root mean square, that its noise is at least
+
 
 @checked
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,9 @@ class Constrained:
         # Columns that depend on the fit are taken where least squares converged.
         model = free.model
         factors = factorise(rows(model, dataset, free.values))
-        std = free.torque_std
+        size = factors.torque_norms / np.sqrt(np.maximum(factors.counts, 1))
+        # What is fitted to more digits than a prior can be weighed against is no measured torque.
+        std = np.maximum(free.torque_std, _DIGITS * size)
         if self.weighting == "none":
             std = np.full(len(std), np.sqrt(np.mean(std**2)))
         R = factors.pooled(1.0 / std)

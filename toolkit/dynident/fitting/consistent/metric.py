@@ -124,7 +124,7 @@ class Metric:
         FitError
             As `solve_factors`.
         """
-        factors = factorise(rows(model, dataset, values))
+        factors = factorise(rows(model, dataset.of_joints(model.robot.names), values))
         solution = solve_factors(model, factors)
         p = model.size
         R = factors.pooled(1.0 / solution.torque_std)[:p, :p]
