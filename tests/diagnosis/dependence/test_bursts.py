@@ -7,7 +7,7 @@ import pytest
 
 from dynident import diagnose
 from dynident.criteria import VerdictCriteria
-from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
+from dynident.diagnosis.dependence.bursts import beyond_reversals, burst_notes, bursts_in
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -22,10 +22,12 @@ def left(
     *residuals: np.ndarray,
     certain: np.ndarray | None = None,
     predicted: np.ndarray | None = None,
+    v: float | np.ndarray = 1.0,
 ) -> HeldOut:
     """A model that leaves (T, n) of recordings at 50 Hz."""
     still = np.zeros_like(residuals[0])
     torque = still if predicted is None else predicted
+    v = still + v
     whole = np.ones(still.shape, dtype=bool)
     runs = tuple(
         HeldOutRun(
@@ -33,7 +35,7 @@ def left(
             certain=whole if certain is None else certain,
             t=np.arange(len(one)) / 50.0,
             q=still,
-            v=still,
+            v=v,
             a=still,
             measured=torque + one,
             predicted=torque,
@@ -45,8 +47,12 @@ def left(
 
 
 def told(trained: HeldOut) -> tuple[str, ...]:
-    """What is said of joints a and b."""
-    return burst_notes(bursts_in(trained, ["a", "b"], ["N m", "N"], VerdictCriteria()))
+    """What is said of joints a and b, which turn round below 0.01."""
+    every, moving = (
+        bursts_in(one, ["a", "b"], ["N m", "N"], VerdictCriteria())
+        for one in (trained, beyond_reversals(trained, np.full(2, 0.01)))
+    )
+    return burst_notes(every, moving)
 
 
 def noise(seed: int) -> np.ndarray:
@@ -107,6 +113,32 @@ def test_what_does_not_count_is_no_burst() -> None:
     certain[95:110, 0] = False
     assert told(left(one))
     assert not told(left(one, certain=certain))
+
+
+def test_bursts_where_a_joint_turns_round_are_its_friction() -> None:
+    """At 0.4 rad/s from row to row the speed is below 0.01 in hardly any of them."""
+    swings = 3.0 * np.sin(np.arange(ROWS) / 7.5)[:, None] * [1.0, 0.0] + [0.0, 1.0]
+    turns = np.flatnonzero(swings[1:, 0] * swings[:-1, 0] <= 0.0)
+    at_turns, elsewhere = noise(7), noise(7)
+    at_turns[turns[::4], 0] = 50.0
+    elsewhere[turns[::4] + 8, 0] = 50.0
+    assert not bursts_in(
+        beyond_reversals(left(at_turns, v=swings), np.full(2, 0.01)),
+        ["a", "b"],
+        ["N m", "N m"],
+        VerdictCriteria(),
+    )
+    (said,) = told(left(at_turns, v=swings))
+    assert "; at a the " in said and said.endswith("no verdict rests on them.")
+    (said,) = told(left(elsewhere, v=swings))
+    assert "; at a the " in said and "turns round" not in said
+
+
+def test_a_joint_that_stands_breaks_nothing() -> None:
+    one = noise(8)
+    one[100] = 50.0
+    (said,) = told(left(one, v=0.0))
+    assert "At a and b they are where the joint turns round" in said
 
 
 def test_few_rows_and_nothing_left_say_nothing() -> None:

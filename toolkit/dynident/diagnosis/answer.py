@@ -88,7 +88,8 @@ class Answer:
         held-out recordings leave none: the verdict is "unexplained" for that alone.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
         of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
-    bursts : joints at which a few instants hold most of what is left of the training recordings.
+    bursts : joints at which a few instants, not those of their reversals, hold most of what is left
+        of the training recordings.
     sampled : when the torque acts, where that is not when the study says.
     too_fast : the joint that is faster than it can be, as the study reads its position.
     switches : every choice among the effects added, fitted and judged, where that was asked for.

@@ -15,7 +15,7 @@ import numpy as np
 from dynident.diagnosis.advice.experiments import Adviser
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.candidate_gains import candidate_gains
-from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
+from dynident.diagnosis.dependence.bursts import beyond_reversals, burst_notes, bursts_in
 from dynident.diagnosis.details import (
     Candidate,
     JointResult,
@@ -108,7 +108,8 @@ def assemble(
     source = noise_source(evidence, held)
     trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
     names, units, judging = given.robot.names, given.robot.torque_units, evidence.criteria.verdict
-    bursts = bursts_in(trained, names, units, judging)
+    widths = stages[-1].model.friction_widths
+    bursts = bursts_in(beyond_reversals(trained, widths), names, units, judging)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], judging, bursts)
     final = estimate_of(evidence, stages[-1], train)
     impossible = ()
@@ -138,7 +139,7 @@ def assemble(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),
-            *burst_notes(bursts),
+            *burst_notes(bursts_in(trained, names, units, judging), bursts),
             *rounding_notes(after, given.robot.names, judging),
             *notes_on_steps(steps, held),
             *unseen_notes(evidence, stages[-1], tuple(step.effect.label for step in steps)),

@@ -4,17 +4,21 @@ Noise of a torque spreads what is left over the whole recording. A link that kno
 other side of its backlash, an end stop, a touch, or a sensor that drops out does not: a few
 instants hold nearly all of it. The residual of a whole recording may be small in spite of them,
 and recordings that judge may have none. So they are told, whatever the verdict.
+
+Where a joint turns round, bursts are no evidence that something is missing: friction that reverses
+more sharply than a tanh, or that sticks, leaves them there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from dynident.criteria import VerdictCriteria
 from dynident.evidence.held_out import HeldOut, HeldOutRun
-from dynident.tables import percent
+from dynident.tables import listed, percent
 
 _BEYOND = 5.0
 """Size of a burst over the rms of all rows but the largest: normal noise is not so once in 1e6."""
@@ -61,15 +65,46 @@ def bursts_in(
     return found
 
 
-def burst_notes(found: Mapping[str, str]) -> tuple[str, ...]:
-    """Return one note on all joints of `bursts_in`; none where there is no joint."""
+def beyond_reversals(trained: HeldOut, widths: np.ndarray) -> HeldOut:
+    """Return the same without the rows in which joints turn round, or stand.
+
+    Parameters
+    ----------
+    trained : what a model leaves.
+    widths : (n,) speeds below which friction turns round, rad/s or m/s.
+    """
+    runs = []
+    for run in trained.runs:
+        turning = np.abs(run.v) < widths
+        between = run.v[1:] * run.v[:-1] <= 0.0
+        turning[1:] |= between
+        turning[:-1] |= between
+        runs.append(replace(run, certain=run.certain & ~turning))
+    return replace(trained, runs=tuple(runs))
+
+
+def burst_notes(found: Mapping[str, str], beyond: Collection[str]) -> tuple[str, ...]:
+    """Return one note on all joints of `bursts_in`; none where there is no joint.
+
+    Parameters
+    ----------
+    found : of all rows.
+    beyond : joints with bursts in other rows than those of `beyond_reversals`.
+    """
     if not found:
         return ()
+    turning = [joint for joint in found if joint not in beyond]
+    friction = ""
+    if turning:
+        friction = (
+            f" At {listed(turning)} they are where the joint turns round: its dry friction "
+            "reverses otherwise than the model's, and no verdict rests on them."
+        )
     return (
         "A few training rows hold most of the square of what the model leaves; "
         f"{'; '.join(found.values())}. Noise of one size is seldom like that. Backlash or a stop "
         "that the link knocks against is, a touch, friction at a reversal, a fault of the "
-        "recording, or one that is noisier than the others.",
+        f"recording, or one that is noisier than the others.{friction}",
     )
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.diagnosis.dependence.bursts import bursts_in
+from dynident.diagnosis.dependence.bursts import beyond_reversals, bursts_in
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
@@ -127,7 +127,8 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     if not last.fitted.noise_known:
         names, units = model.robot.names, model.robot.torque_units
         least = evidence.criteria.global_search.held_by_few
-        bursts = bursts_in(trained, names, units, replace(judging, held_by_few=least))
+        moving = beyond_reversals(trained, last.fitted.model.friction_widths)
+        bursts = bursts_in(moving, names, units, replace(judging, held_by_few=least))
         every = [one for one in every if one.joint in bursts and one.nonlinear]
         return [one for one in every if one in last.fitted.model] or every
     if within_noise(trained, judging):
