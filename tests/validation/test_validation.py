@@ -86,6 +86,12 @@ def estimate(scale: float = 1.0, friction: tuple[float, float] = FRICTION) -> Es
     return replace(given_estimate(arm(), known), values=values, links=None)
 
 
+def test_a_single_recording_is_taken_as_a_dataset_of_one() -> None:
+    one, _ = recordings()
+    alone, listed = (validate(estimate(), each, CONTROLLER) for each in (one, dataset(one)))
+    assert alone.errors.of("position") == listed.errors.of("position")
+
+
 def test_the_true_model_in_its_own_loop_moves_as_measured() -> None:
     found = validate(estimate(), dataset(*recordings()), CONTROLLER)
     assert found.verdict == "follows" and not found.skipped

@@ -230,8 +230,8 @@ def _fitted_to(estimates: Collection[Estimate], dataset: Dataset) -> tuple[str, 
 @single_threaded
 def compare_models(
     models: Mapping[str, Model],
-    train: Dataset,
-    test: Dataset,
+    train: Dataset | Recording,
+    test: Dataset | Recording,
     controller: Controller | None = None,
     criteria: Criteria = DEFAULTS,
 ) -> Comparison:
@@ -240,8 +240,8 @@ def compare_models(
     Parameters
     ----------
     models : by name.
-    train : recordings to fit.
-    test : recordings to judge by; where it is empty, blocks of time of the training recordings
+    train : recordings to fit, or a single one.
+    test : recordings to judge by, or a single one; where it is empty, blocks of time of the training recordings
         are held out.
     controller : as in `compare`; the loops are those of the test recordings, or of the training
         recordings where there are none.
@@ -252,7 +252,7 @@ def compare_models(
     As `compare`, of the fitted models.
     """
     joints = _joints_of(models.values())
-    train, test = (one.of_joints(joints) for one in (train, test))
+    train, test = (Dataset.of(one, joints) for one in (train, test))
     wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
     train = without_stops(models.values(), train)
     test = without_stops(models.values(), test, standing_in(train))

@@ -25,7 +25,7 @@ from dynident.experiment_design.telling.separation import Separation, times_unti
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.progress import logged
-from dynident.recording import Dataset
+from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
 from dynident.tables import percent
 from dynident.threads import single_threaded
@@ -39,7 +39,7 @@ _HOPELESS = 0.01  # standard deviations with the best usual motion: told by none
 @single_threaded
 def design(
     model: Model | Estimate,
-    recorded: Dataset,
+    recorded: Dataset | Recording,
     task: DesignTask | None = None,
     *,
     limits: MotionLimits | None = None,
@@ -53,7 +53,7 @@ def design(
     Parameters
     ----------
     model : the robot and its effects, or an estimate of it.
-    recorded : recordings so far, with their filter.
+    recorded : recordings so far, with their filter, or a single one.
     task : what for; default: all parameters.
     limits : of the motion; default: nine tenths of the description's.
     progress : is called with what is being done, for a display.
@@ -73,7 +73,7 @@ def design(
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
     limits.require_ranges(model.robot)
-    recorded = recorded.of_joints(model.robot.names)
+    recorded = Dataset.of(recorded, model.robot.names)
     loads = tuple(dict.fromkeys(task.loads))
     if len(loads) < 2:
         return _designed(model, recorded, task, limits, progress)

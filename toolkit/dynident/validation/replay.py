@@ -38,7 +38,7 @@ _ROUNDING = 1.05
 @single_threaded
 def validate(
     estimate: Estimate,
-    dataset: Dataset,
+    dataset: Dataset | Recording,
     controller: Controller,
     *,
     criteria: Criteria = DEFAULTS,
@@ -54,7 +54,7 @@ def validate(
     Parameters
     ----------
     estimate : of the robot and its effects.
-    dataset : recordings; those without a reference are left out by name.
+    dataset : recordings, or a single one; those without a reference are left out by name.
     controller : of the loop in which they were made.
     criteria : its `loops` say what the errors mean.
     progress : called now and then with the seconds simulated, and the seconds to simulate.
@@ -69,7 +69,7 @@ def validate(
         If no recording has a reference, or the controller cannot be simulated or is another
         robot's. A loop that cannot be simulated is no error: see `Validation.skipped`.
     """
-    dataset = dataset.of_joints(estimate.robot.names)
+    dataset = Dataset.of(dataset, estimate.robot.names)
     return simulate_again(Judged.of(estimate), dataset, controller, criteria.loops, progress)
 
 
