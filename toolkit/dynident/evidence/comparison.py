@@ -241,8 +241,8 @@ def compare_models(
     ----------
     models : by name.
     train : recordings to fit, or a single one.
-    test : recordings to judge by, or a single one; where it is empty, blocks of time of the training recordings
-        are held out.
+    test : recordings to judge by, or a single one; where it is empty, blocks of time of the
+        training recordings are held out.
     controller : as in `compare`; the loops are those of the test recordings, or of the training
         recordings where there are none.
     criteria : of the noise, the fit, of loops and of what residual maps show.
