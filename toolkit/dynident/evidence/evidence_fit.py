@@ -148,7 +148,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         settled = bool(small) or not model.needs_values
-        if round >= criteria.noise_rounds - (near is not None) and small:
+        enough = round >= criteria.noise_rounds - (near is not None)
+        if enough and (small or fixed_point.stalls):
             break
         at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values, white)

@@ -9,6 +9,10 @@ from dynident.model import Model
 _SHRUNK = 0.9
 """Share of the change before which a change has to stay below, or the next step is shorter."""
 _SHORTEST = 0.1
+_NEAR = 1e-2
+"""Relative change of the values below which they may stall."""
+_PATIENCE = 5
+"""Repetitions after which a change is to be the smaller half of what it was before them."""
 
 
 class FixedPoint:
@@ -19,6 +23,17 @@ class FixedPoint:
 
     def __init__(self) -> None:
         self._share, self._change = 1.0, np.inf
+        self._relative: list[float] = []
+
+    @property
+    def stalls(self) -> bool:
+        """Whether values near their end no longer come nearer.
+
+        Columns that change by steps with the values, as those of a gap whose link knocks, let them
+        jump to and fro by a little for ever.
+        """
+        before, last = self._relative[:-_PATIENCE], self._relative[-_PATIENCE:]
+        return bool(before) and min(last) < _NEAR and min(last) > 0.5 * min(before)
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the values at which the columns are taken next.
@@ -38,6 +53,7 @@ class FixedPoint:
         if change > _SHRUNK * self._change:
             self._share = max(self._share / 2, _SHORTEST)
         self._change = change
+        self._relative.append(change / max(float(np.linalg.norm(found)), np.finfo(float).tiny))
         return at + self._share * step
 
 

@@ -1,0 +1,51 @@
+"""A fit whose columns depend on its result: when its repetitions come no nearer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dynident.fitting.fixed_point import FixedPoint
+from dynident.model import Model
+from synthetic import arm
+
+ROUNDS = 30
+
+
+def rounds_of(found: Callable[[np.ndarray], np.ndarray], tolerance: float = 1e-4) -> int:
+    """Repetitions until values agree with what is found with them, or stall."""
+    model, fixed_point = Model(arm()), FixedPoint()
+    at = model.given_values()
+    for k in range(ROUNDS):
+        values = found(at)
+        if np.linalg.norm(values - at) < tolerance * np.linalg.norm(values) or fixed_point.stalls:
+            return k + 1
+        at = fixed_point.following(model, at, values)
+    return ROUNDS
+
+
+@pytest.mark.parametrize("rate", [0.2, 0.7])
+def test_values_that_come_nearer_are_followed_to_their_end(rate: float) -> None:
+    end = 1.1 * Model(arm()).given_values()
+    reached = rounds_of(lambda at: end + rate * (at - end))
+    expected = np.log(1e-4 / ((1.0 - rate) * 0.1 / 1.1)) / np.log(rate)
+    assert expected <= reached <= expected + 2
+
+
+def test_values_that_jump_to_and_fro_by_a_little_are_not() -> None:
+    rng = np.random.default_rng(0)
+    end = 1.1 * Model(arm()).given_values()
+    size = 5e-4 * np.linalg.norm(end) / np.sqrt(len(end))
+
+    def jumping(at: np.ndarray) -> np.ndarray:
+        return end + 0.3 * (at - end) + size * rng.normal(size=len(end))
+
+    assert 6 <= rounds_of(jumping) <= 15
+
+
+def test_values_far_from_their_end_do_not_stall() -> None:
+    """They swing by a tenth, and shorter steps bring them together."""
+    end = 1.1 * Model(arm()).given_values()
+    assert rounds_of(lambda at: end - 1.2 * (at - end)) < ROUNDS
