@@ -98,7 +98,7 @@ def test_the_provenance_says_how_many_rows_and_why():
     words = sources_of(dataset)[0].filter
     rows = len(sample(dataset.recordings[0], USERS).t)
     assert f"{rows} of 400 rows used" in words
-    assert "the filter sees past the ends (0.162 and 0.162 s)" in words
+    assert "the filter sees past the ends (0.168 and 0.168 s)" in words
     assert "standing still from 0 to 1.5" in words
     count = count_rows(dataset.recordings[0], USERS)
     assert (count.used, count.standstill, count.window) == (rows, 75, 0)

@@ -62,10 +62,11 @@ def test_instruments_that_are_the_regressor_give_least_squares(model, truth):
 def test_solves_the_instrumental_normal_equations(model, truth):
     true = synthetic(model, truth, 1, rate_hz=200.0, duration=8.0)
     noisy = synthetic(model, truth, 1, rate_hz=200.0, duration=8.0, position_std=3e-5)
-    dataset = Dataset((noisy.replace(window=INNER),), NO_FILTER)
+    settings = replace(NO_FILTER, difference_order=2)
+    dataset = Dataset((noisy.replace(window=INNER),), settings)
     found = di.fit(model, dataset, IV(Oracle(true), weighting="none"))
     ((W, y),) = rows(model, dataset)
-    ((V, _),) = rows(model, Dataset((true.replace(window=INNER),), NO_FILTER))
+    ((V, _),) = rows(model, Dataset((true.replace(window=INNER),), settings))
     W, V, y = W.reshape(-1, model.size), V.reshape(-1, model.size), y.ravel()
     np.testing.assert_allclose(V.T @ (y - W @ found.values), 0.0, atol=1e-9 * np.abs(V.T @ y).max())
     assert found.history is not None

@@ -108,8 +108,8 @@ def assemble(
     source = noise_source(evidence, held)
     trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
     names, units, judging = given.robot.names, given.robot.torque_units, evidence.criteria.verdict
-    widths = stages[-1].model.friction_widths
-    bursts = bursts_in(beyond_reversals(trained, widths), names, units, judging)
+    beyond = beyond_reversals(trained, stages[-1].model, stages[-1].values)
+    bursts = bursts_in(beyond, names, units, judging)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], judging, bursts)
     final = estimate_of(evidence, stages[-1], train)
     impossible = ()

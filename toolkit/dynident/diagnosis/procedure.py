@@ -75,7 +75,7 @@ from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.progress import logged
-from dynident.recording import Dataset, Recording, numbered
+from dynident.recording import Dataset, Recording, filtered_alike, numbered
 from dynident.threads import single_threaded
 from dynident.wiring import check_wiring
 
@@ -128,8 +128,8 @@ def diagnose(
         If a recording is too short, does not repeat with its period, or lacks a joint.
     """
     given = model.model if isinstance(model, Estimate) else model
-    every = (train,) if test is None else (train, test)
-    train, *others = numbered(*(Dataset.of(one, given.robot.names) for one in every))
+    every = (Dataset.of(one, given.robot.names) for one in (train, test) if one is not None)
+    train, *others = numbered(*filtered_alike(*every))
     if not train.recordings:
         raise FitError("no recording to diagnose", remedy='mark some recordings use = "train"')
     if most is None:

@@ -24,7 +24,8 @@ from dynident.fitting.reversals.misplaced_reversals import (
 from dynident.fitting.reversals.standing_joints import standing_in, standing_note, without_stops
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, filtered_alike
+from dynident.recording.derivatives import ORDERS
 from dynident.tables import Shown, Table, finite, mostly_noise, percent
 from dynident.threads import single_threaded
 from dynident.validation.replay import Judged, loop_of
@@ -222,9 +223,16 @@ def _joints_of(models: Iterable[Model]) -> tuple[str, ...]:
 
 
 def _fitted_to(estimates: Collection[Estimate], dataset: Dataset) -> tuple[str, ...]:
-    """Recordings that one of the estimates rests on: the same rows of a file, filtered alike."""
+    """Recordings that one of the estimates rests on: the same rows of a file, filtered alike.
+
+    Whatever order of differences suits them together: alone they may have another one.
+    """
     known = {source for one in estimates for source in one.sources if source.sha256}
-    return tuple(source.file for source in sources_of(dataset) if source in known)
+    filters = [dataset.filter]
+    if dataset.filter and dataset.filter.suited_order:
+        filters = [replace(dataset.filter, suited_order=order) for order in ORDERS]
+    every = [source for one in filters for source in sources_of(replace(dataset, filter=one))]
+    return tuple(dict.fromkeys(source.file for source in every if source in known))
 
 
 @single_threaded
@@ -252,7 +260,7 @@ def compare_models(
     As `compare`, of the fitted models.
     """
     joints = _joints_of(models.values())
-    train, test = (Dataset.of(one, joints) for one in (train, test))
+    train, test = filtered_alike(*(Dataset.of(one, joints) for one in (train, test)))
     wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
     train = without_stops(models.values(), train)
     test = without_stops(models.values(), test, standing_in(train))

@@ -13,7 +13,13 @@ and torque through one low-pass and decimation, in blocks if asked; both follow 
 within a turn; `require_motion` and `require_torque` refuse recordings that show nothing.
 """
 
-from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
+from dynident.recording.dataset import (
+    Dataset,
+    Noise,
+    filtered_alike,
+    numbered,
+    without_ends,
+)
 from dynident.recording.derivatives import (
     central_difference,
     difference_gain,
@@ -107,6 +113,7 @@ __all__ = [
     "default_position_cutoff",
     "difference_gain",
     "differentiate",
+    "filtered_alike",
     "frame_of",
     "frames_in",
     "held_gain",

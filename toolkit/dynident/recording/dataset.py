@@ -44,8 +44,8 @@ class Dataset:
         robot stands still there, and a loop's transient before it repeats, see `usable`.
     filter : where there is none `fit`, `compare`, `diagnose` and the other verbs take
         `common_filter`, which suits the recordings, or where their rates call for different ones
-        `default_filter` at the rate of each. One that has no low-pass of the positions gets the
-        order of differences that suits them, see `with_suited_order`.
+        `default_filter` at the rate of each. One that has no low-pass of the positions, and states
+        no order of differences, gets that which suits the recordings, see `with_suited_order`.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
     Raises
@@ -63,6 +63,8 @@ class Dataset:
         if self.filter is None or self.filter.ends == "drop":
             recordings = tuple(usable(one) for one in recordings)
         object.__setattr__(self, "recordings", recordings)
+        if self.filter is not None:
+            object.__setattr__(self, "filter", with_suited_order(self.filter, recordings))
         for recording in self.recordings[1:]:
             if recording.joints != self.recordings[0].joints:
                 ours = ", ".join(self.recordings[0].joints)
@@ -117,10 +119,8 @@ class Dataset:
 
     def _suited(self) -> Dataset:
         """The same with a filter, unless different ones are called for."""
-        if not self.recordings:
+        if self.filter is not None or not self.recordings:
             return self
-        if self.filter is not None:
-            return replace(self, filter=with_suited_order(self.filter, self.recordings))
         return replace(self, filter=common_filter(self.recordings))
 
     def __add__(self, other: Dataset) -> Dataset:
@@ -133,6 +133,20 @@ def without_ends(dataset: Dataset) -> Dataset:
     if dataset.filter is None or dataset.filter.ends == "drop":
         return dataset
     return replace(dataset, filter=replace(dataset.filter, ends="drop"))
+
+
+def filtered_alike(first: Dataset, *others: Dataset) -> tuple[Dataset, ...]:
+    """Return datasets whose raw positions are differentiated as those of the first one are.
+
+    Each has the order that suits its own recordings; whoever compares them needs one.
+    """
+    order = first.filter and first.filter.suited_order
+    return first, *(
+        replace(one, filter=replace(one.filter, suited_order=order))
+        if order and one.filter and one.filter.suited_order
+        else one
+        for one in others
+    )
 
 
 def numbered(*datasets: Dataset) -> tuple[Dataset, ...]:

@@ -43,6 +43,8 @@ class Filter:
         a joint sticks.
     difference_order : order of accuracy of the central differences of positions, and of the torque
         that held commands make: 2, 4, 6 or 8. None: see `order`.
+    suited_order : that of positions that pass no low-pass, where none is stated. A `Dataset` sets
+        it, see `with_suited_order`.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Filter:
     edge_s: tuple[float, float] = (0.0, 0.0)
     ends: Literal["drop", "keep"] = "drop"
     difference_order: Literal[2, 4, 6, 8] | None = None
+    suited_order: Literal[2, 4, 6, 8] | None = None
 
     def __post_init__(self) -> None:
         for name in ("position_cutoff_hz", "cutoff_hz", "rate_hz"):
@@ -70,9 +73,10 @@ class Filter:
             )
         if self.ends not in ("drop", "keep"):
             raise RecordingError(f"ends = {self.ends!r}", "filter", 'write "drop" or "keep"')
-        if self.difference_order not in (None, *ORDERS):
-            what = f"difference_order = {self.difference_order!r}"
-            raise RecordingError(what, "filter", "write 2, 4, 6 or 8")
+        for name in ("difference_order", "suited_order"):
+            if getattr(self, name) not in (None, *ORDERS):
+                what = f"{name} = {getattr(self, name)!r}"
+                raise RecordingError(what, "filter", "write 2, 4, 6 or 8")
         if len(self.edge_s) != 2 or not all(math.isfinite(e) and e >= 0 for e in self.edge_s):
             remedy = "give two times in s, not negative"
             raise RecordingError(f"edge_s = {self.edge_s!r}", "filter", remedy)
@@ -99,11 +103,11 @@ class Filter:
     def order(self) -> int:
         """Order of accuracy of the differences.
 
-        Where none is stated 8 behind a low-pass of the positions, and 2 without: the higher it is,
-        the more of the noise near half the sampling rate it lets through. Without a low-pass a
-        dataset states the one that suits its recordings, see `with_suited_order`.
+        Where none is stated 8 behind a low-pass of the positions. Without one the higher it is, the
+        more of the noise near half the sampling rate it lets through: it is `suited_order`, or 2.
         """
-        return self.difference_order or (ORDERS[-1] if self.position_cutoff_hz else ORDERS[0])
+        raw = self.suited_order or ORDERS[0]
+        return self.difference_order or (ORDERS[-1] if self.position_cutoff_hz else raw)
 
     def narrowed(self, share: float, rate_hz: float) -> Filter:
         """Return the filter with its cut-offs at a share of what they are, for samples at a rate.

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 
 import numpy as np
 
@@ -45,10 +46,11 @@ _ALIKE = 1.05  # largest over smallest of the rates that recordings are decimate
 _PARTS, _LENGTH = 16, 4096
 """Parts of a recording that are looked at, spread over it, and samples of each at most."""
 _LEAST = 400  # samples of a part that is looked at
+_LEAST_RAW = 60  # the same where only the order of differences is chosen
 _MOVES = 20.0  # range of a joint that moves over the noise of its positions
 _NOISE_RATE = 5.0
 """Rate down to which noise is looked for, over the usual cut-off."""
-_UNKNOWN = 0.3
+BIAS = 0.3
 """Share of the bias by noise that a fit cannot foretell. It foretells none by short differences."""
 _TURN = np.linspace(0.0, np.pi, _FREQUENCIES)[1:]
 """Angles per sample at which a filter's response is taken, rad."""
@@ -127,7 +129,7 @@ def suited_position_cutoff(recordings: Sequence[Recording], cutoff_hz: float | N
     if len(tried) == 1:
         return tried[0]
     try:
-        errors = [_errors(q, one.rate_hz, tried) for one in recordings for q in _parts(one)]
+        errors = [_errors(q, one.rate_hz, tried) for one in recordings for q in _parts(one, _LEAST)]
     except RecordingError:  # which whoever samples the recording will tell, with its place
         return tried[0]
     return tried[int(np.argmin(np.sum(errors, axis=0)))] if errors else tried[0]
@@ -163,39 +165,49 @@ def suited_filter(recordings: Sequence[Recording]) -> Filter:
     return replace(usual, position_cutoff_hz=suited_position_cutoff(recordings, usual.cutoff_hz))
 
 
-def with_suited_order(filter: Filter, recordings: Sequence[Recording]) -> Filter:
+def with_suited_order(
+    filter: Filter, recordings: Sequence[Recording], bias: float = BIAS
+) -> Filter:
     """Return the filter with the order of its differences, where it leaves both to be chosen.
 
     Parameters
     ----------
-    filter : one that states an order, filters positions, or keeps the ends, as published recipes
-        do, comes back as it is.
+    filter : one that has an order, filters positions, or keeps the ends, as published recipes do,
+        comes back as it is; and so it does where recordings are too short to tell.
     recordings : all that pass it.
+    bias : share that counts of what noise of the accelerations takes off an inertia. The default is
+        that of least squares, which is not foretold (`fitting.uncertainty`); instruments have none.
 
     Returns
     -------
-    With the order that makes the error of inertias by least squares smallest: what noise of the
-    accelerations takes off them, its variance over that of the motion, and what differences fall
-    short. In the geometric mean over joints, while they move.
+    With the order that makes errors of inertias smallest, in the mean over joints, while they move:
+    what differences fall short, the bias, and what noise scatters.
     """
-    if filter.difference_order or filter.position_cutoff_hz or filter.ends == "keep":
+    stated = filter.difference_order or filter.suited_order or filter.position_cutoff_hz
+    if stated or filter.ends == "keep":
         return filter
+    some = recordings[:: 1 + len(recordings) // _PARTS]
+    samples = sum(one.samples for one in recordings)
     try:
-        every = ((q, one.rate_hz) for one in recordings for q in _parts(one))
-        errors = [_errors_of_orders(q, rate, filter.cutoff_hz) for q, rate in every]
+        every = [(q, one) for one in some for q in _parts(one, _LEAST_RAW)]
+        found = [_order_errors(q, one.rate_hz, filter.cutoff_hz) for q, one in every]
     except RecordingError:  # which whoever samples the recording will tell, with its place
         return filter
-    if not errors:
+    if not found:
         return filter
-    return replace(filter, difference_order=ORDERS[int(np.argmin(np.sum(errors, axis=0)))])
+    errors = [
+        one.samples * np.sqrt((short + bias * noise) ** 2 + noise / samples).sum(axis=1)
+        for (_, one), (short, noise) in zip(every, found, strict=True)
+    ]
+    return replace(filter, suited_order=ORDERS[int(np.argmin(np.sum(errors, axis=0)))])
 
 
-def _parts(recording: Recording) -> list[np.ndarray]:
-    """Positions (T, n) in parts of the recording, within its window."""
+def _parts(recording: Recording, least: int) -> list[np.ndarray]:
+    """Positions (T, n) in parts of the recording, within its window; none of fewer samples."""
     low, high = recording.window or (-np.inf, np.inf)
     first, after = np.searchsorted(recording.t, [low, high]).tolist()
     length = min(_LENGTH, after - first)
-    if length < _LEAST:
+    if length < least:
         return []
     begins = np.linspace(first, after - length, min(_PARTS, (after - first) // length))
     return [recording.q[k : k + length] for k in begins.astype(int).tolist()]
@@ -222,34 +234,48 @@ def _errors(q: np.ndarray, rate_hz: float, cutoffs: Sequence[float]) -> np.ndarr
     return np.sum(np.log(np.array(squares)[:, moves]), axis=1)
 
 
-def _errors_of_orders(q: np.ndarray, rate_hz: float, cutoff_hz: float | None) -> np.ndarray:
-    """Logarithms of the errors of inertias with differences of each order, over joints that move.
+def _order_errors(
+    q: np.ndarray, rate_hz: float, cutoff_hz: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """What accelerations are off with differences of each order, of joints that move, (4, m).
 
     Parameters
     ----------
     q : (T, n) positions.
     rate_hz : of the samples.
     cutoff_hz : of columns and torque, if there is one.
+
+    Returns
+    -------
+    What they fall short, relative, and the variance of their noise over the mean square of the
+    motion's.
     """
-    usual = default_position_cutoff(rate_hz, cutoff_hz)
-    # What is left of noise near half the sampling rate is what differences magnify.
-    noise, smooth = _noise(q, (1,)), lowpass(q, rate_hz, usual)
-    moves = np.ptp(q, axis=0) > _MOVES * noise
+    # What a drive has filtered before it was recorded is seen in every k-th sample alone, and has
+    # that much less of the band that differences magnify.
+    every = (1, 2, 4)
+    noise = np.array([_noise(q, (k,)) for k in every])
+    # Half the usual one leaves a thirtieth of what noise adds to the motion's accelerations.
+    low = default_position_cutoff(rate_hz, cutoff_hz) / 2.0
+    smooth = lowpass(q, rate_hz, low)
+    moves = np.ptp(q, axis=0) > _MOVES * noise[0]
     passed = np.ones_like(_TURN)
     if cutoff_hz and cutoff_hz < rate_hz / 2:
         passed = np.abs(response(butterworth(rate_hz, cutoff_hz), _TURN)) ** 2
 
-    def twice(x: np.ndarray, order: int) -> np.ndarray:
-        return central_difference(central_difference(x, rate_hz, order), rate_hz, order)
+    around = max(ORDERS[-1], ceil(rate_hz / low))  # what the low-pass makes up
 
-    best, errors = twice(smooth, ORDERS[-1]), []
+    def twice(order: int) -> np.ndarray:
+        v = central_difference(smooth, rate_hz, order)
+        return central_difference(v, rate_hz, order)[around:-around]
+
+    best, short, noisy = twice(ORDERS[-1]), [], []
     size = np.mean(best**2, axis=0)
     for order in ORDERS:
-        gain = rate_hz**2 * difference_gain(_TURN, order) ** 2 * passed
-        noisy = noise**2 * np.trapezoid(gain**2, _TURN) / np.pi
-        short = np.mean((twice(smooth, order) - best) * best, axis=0)
-        errors.append(np.log((_UNKNOWN * noisy + np.abs(short))[moves] / size[moves]).sum())
-    return np.array(errors)
+        gain = (rate_hz**2 * difference_gain(_TURN, order) ** 2 * passed) ** 2
+        within = [k * np.trapezoid(np.where(k * _TURN <= np.pi, gain, 0.0), _TURN) for k in every]
+        noisy.append(np.max(noise**2 * np.array(within)[:, None] / np.pi, axis=0))
+        short.append(np.abs(np.mean((twice(order) - best) * best, axis=0)))
+    return np.array(short)[:, moves] / size[moves], np.array(noisy)[:, moves] / size[moves]
 
 
 def _noise(q: np.ndarray, every: Sequence[int]) -> np.ndarray:

@@ -25,6 +25,7 @@ from dynident.recording import (
     read,
     sound_part,
     suited_position_cutoff,
+    with_suited_order,
     within_limits,
 )
 from dynident.robot import Robot
@@ -87,7 +88,7 @@ def filter_of(said: FilterEntry | None, recordings: list[Recording]) -> Filter |
     if usual and not is_recipe:
         position = suited_position_cutoff(recordings, cutoff)
     values |= {"position_cutoff_hz": None if position == "none" else position, "cutoff_hz": cutoff}
-    return Filter(**values)
+    return with_suited_order(Filter(**values), recordings)
 
 
 def recordings_of(

@@ -15,13 +15,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from dynident.criteria import VerdictCriteria
 from dynident.evidence.held_out import HeldOut, HeldOutRun
+from dynident.model import Model
 from dynident.tables import listed, percent
 
 _BEYOND = 5.0
 """Size of a burst over the rms of all rows but the largest: normal noise is not so once in 1e6."""
+_BOTH = 2.0  # of the level of dry friction, that a wrong direction makes at most
 _GAP = 5
 """Rows between two parts of one burst, which a filter makes ring."""
 
@@ -65,21 +68,30 @@ def bursts_in(
     return found
 
 
-def beyond_reversals(trained: HeldOut, widths: np.ndarray) -> HeldOut:
-    """Return the same without the rows in which joints turn round, or stand.
+def beyond_reversals(trained: HeldOut, model: Model, values: np.ndarray) -> HeldOut:
+    """Return the same without what dry friction may leave where joints turn round.
+
+    Friction in the wrong direction leaves twice its level at most: what is larger counts, and so
+    does all of a joint without dry friction.
 
     Parameters
     ----------
     trained : what a model leaves.
-    widths : (n,) speeds below which friction turns round, rad/s or m/s.
+    model, values : (p,) that model, with its friction widths.
     """
+    level = np.zeros(model.robot.n)
+    for j, joint in enumerate(model.robot.names):
+        if (place := model.slices.get(f"coulomb_friction@{joint}")) is not None:
+            level[j] = values[place.start]
     runs = []
     for run in trained.runs:
-        turning = np.abs(run.v) < widths
-        between = run.v[1:] * run.v[:-1] <= 0.0
-        turning[1:] |= between
-        turning[:-1] |= between
-        runs.append(replace(run, certain=run.certain & ~turning))
+        turns = np.zeros(run.v.shape, dtype=bool)
+        turns[1:] = run.v[1:] * run.v[:-1] < 0.0
+        turns[:-1] |= turns[1:]
+        slow = np.abs(run.v) < model.friction_widths
+        turning = turns | (slow & (maximum_filter1d(turns, 2 * _GAP + 1, axis=0)))
+        friction = turning & (np.abs(run.residual) <= _BOTH * level)
+        runs.append(replace(run, certain=run.certain & ~friction))
     return replace(trained, runs=tuple(runs))
 
 
@@ -89,7 +101,7 @@ def burst_notes(found: Mapping[str, str], beyond: Collection[str]) -> tuple[str,
     Parameters
     ----------
     found : of all rows.
-    beyond : joints with bursts in other rows than those of `beyond_reversals`.
+    beyond : joints with bursts in the rows of `beyond_reversals`.
     """
     if not found:
         return ()
@@ -97,8 +109,9 @@ def burst_notes(found: Mapping[str, str], beyond: Collection[str]) -> tuple[str,
     friction = ""
     if turning:
         friction = (
-            f" At {listed(turning)} they are where the joint turns round: its dry friction "
-            "reverses otherwise than the model's, and no verdict rests on them."
+            f" At {listed(turning)} too few are left without those where the joint turns round, "
+            "which dry friction may leave that reverses otherwise than the model's: no verdict "
+            "rests on them."
         )
     return (
         "A few training rows hold most of the square of what the model leaves; "

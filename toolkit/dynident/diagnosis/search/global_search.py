@@ -127,7 +127,7 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     if not last.fitted.noise_known:
         names, units = model.robot.names, model.robot.torque_units
         least = evidence.criteria.global_search.held_by_few
-        moving = beyond_reversals(trained, last.fitted.model.friction_widths)
+        moving = beyond_reversals(trained, last.fitted.model, last.fitted.values)
         bursts = bursts_in(moving, names, units, replace(judging, held_by_few=least))
         every = [one for one in every if one.joint in bursts and one.nonlinear]
         return [one for one in every if one in last.fitted.model] or every

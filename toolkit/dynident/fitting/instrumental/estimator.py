@@ -23,7 +23,7 @@ from dynident.fitting.instrumental.source import (
 )
 from dynident.fitting.least_squares import LeastSquares
 from dynident.model import Model
-from dynident.recording import Dataset
+from dynident.recording import Dataset, with_suited_order
 from dynident.threads import single_threaded
 
 Start = Literal["least_squares", "description", "regular"]
@@ -113,6 +113,7 @@ class IV:
         """
         if not dataset.recordings:
             raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
+        dataset = _without_bias(dataset)
         first = LeastSquares(self.weighting, "independent").fit(model, dataset)
         start = start_values(self.start, model, first)
         guess = Guess(start, (model.given_values(), first.values), self.progress)
@@ -131,6 +132,14 @@ class IV:
         iterations = Iterations(settings, model, source, start, name.replace("_", " "))
         iterations.run()
         return iterations
+
+
+def _without_bias(dataset: Dataset) -> Dataset:
+    """The same with the order of raw differences that suits what noise does not bias."""
+    if dataset.filter is None or not dataset.filter.suited_order:
+        return dataset
+    anew = replace(dataset.filter, suited_order=None)
+    return replace(dataset, filter=with_suited_order(anew, dataset.recordings, 0.0))
 
 
 def _hopeless(source: InstrumentSource, start: np.ndarray) -> bool:
