@@ -9,7 +9,7 @@ import pytest
 
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.quantisation import rounding_power
-from dynident.diagnosis.nuisances.width_notes import friction_width_notes
+from dynident.diagnosis.nuisances.width_notes import found_widths
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -189,7 +189,7 @@ def test_of_a_joint_that_sticks_no_width_is_said_to_be_found() -> None:
     model = Model(robot, tuple(e for name in names for e in effects_of(name, robot)), 0.05)
     of = evidence(model, 0.0)
     wider = model.with_friction_width("elbow", 0.2).with_friction_width("shoulder", 0.2)
-    shoulder, elbow = friction_width_notes(of, fit_evidence(of, wider))
+    shoulder, elbow = found_widths(of, fit_evidence(of, wider)).notes
     assert "over which dry friction reverses" in shoulder
     assert "by the rows that count" in elbow and "no finding" in elbow
     assert "friction_width =" not in shoulder + elbow  # neither is known

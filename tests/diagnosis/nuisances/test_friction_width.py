@@ -11,7 +11,9 @@ from dynident.diagnosis.nuisances.friction_width import (
     at_best_widths,
     with_friction_width,
 )
-from dynident.diagnosis.nuisances.width_notes import friction_width_notes
+from dynident.diagnosis.nuisances.width_notes import found_widths
+from dynident.diagnosis.search.shaped_fit import refitted
+from dynident.effects.friction.stribeck_friction import StribeckFriction
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import on_recordings
@@ -42,7 +44,7 @@ def test_a_width_that_the_data_call_for_stays_and_its_interval_holds_it() -> Non
     low, high = WidthProfile(evidence, kept, "elbow").interval()
     assert low <= kept.model.friction_widths[1] <= high
     assert low <= STATED <= high
-    (note,) = friction_width_notes(evidence, kept)
+    (note,) = found_widths(evidence, kept).notes
     width = kept.model.friction_widths[1]
     assert f"friction_width = {{ shoulder = 0.01, elbow = {width:.2g} }}" in note
 
@@ -68,7 +70,7 @@ def test_a_width_far_beyond_its_price_needs_no_fit_of_the_stated_one(
     assert (kept is own) == (drop > friction_width._price(own))
 
 
-@pytest.mark.parametrize(("stated", "is_found"), [(0.014, False), (0.04, True)])
+@pytest.mark.parametrize(("stated", "is_found"), [(0.011, False), (0.014, True), (0.04, True)])
 def test_where_nothing_repeats_a_width_is_taken_if_it_is_worth_its_price(
     stated: float, is_found: bool
 ) -> None:
@@ -94,6 +96,28 @@ def test_where_nothing_repeats_a_width_is_taken_if_it_is_worth_its_price(
         assert found.model.friction_widths[1] == pytest.approx(STATED, rel=0.5)
         worth = start.error_signal - in_metric_of(evidence, found, start).error_signal
         assert worth > 2 * np.log(start.rows)
+
+
+def test_a_width_and_stribeck_friction_that_makes_up_for_it_are_told_apart() -> None:
+    """With either held the other has its best value, and both are wrong."""
+    stribeck = StribeckFriction("elbow").shaped(0.03)
+    truth = true_model().with_friction_width("elbow", 0.004) + stribeck
+    friction = {"Fv__shoulder": 2.0, "Fv__elbow": 1.0, "Fc__elbow": 1.5, "Fs__elbow": 0.8}
+    values = true_values(truth, **friction)
+    runs = [
+        synthetic(truth, values, seed, rate_hz=200, period=None, torque_std=0.02)
+        for seed in (8, 9, 10)
+    ]
+    given = truth.with_friction_width("elbow", 0.01)
+    evidence = Evidence(given, gather(Dataset(tuple(runs))))
+    start = refitted(evidence, given)
+    place = given.names.index("Fs@elbow")
+    assert start.values[place] > 1.2 * 0.8
+    found = with_friction_width(evidence, start)
+    (speed,) = next(e.shape for e in found.model.effects if e.label == stribeck.label)
+    assert found.model.friction_widths[1] == pytest.approx(0.004, rel=0.1)
+    assert found.values[place] == pytest.approx(0.8, rel=0.1)
+    assert speed == pytest.approx(0.03, rel=0.1)
 
 
 def test_dithered_friction_may_be_as_wide_as_the_speeds_whatever_is_stated() -> None:

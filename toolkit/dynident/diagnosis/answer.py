@@ -90,6 +90,8 @@ class Answer:
         of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
     bursts : joints at which a few instants, not those of their reversals, hold most of what is left
         of the training recordings.
+    friction_widths : of every joint, rad/s or m/s, where fits need others than the model's: both
+        models were fitted with those.
     sampled : when the torque acts, where that is not when the study says.
     too_fast : the joint that is faster than it can be, as the study reads its position.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
@@ -125,6 +127,7 @@ class Answer:
     training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
     bursts: tuple[str, ...] = ()
+    friction_widths: Mapping[str, float] = field(default_factory=dict)
     sampled: SamplingTime | None = None
     too_fast: OverSpeed | None = None
     switches: Switches | None = None

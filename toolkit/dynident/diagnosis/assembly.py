@@ -32,6 +32,7 @@ from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
 from dynident.diagnosis.nuisances.unseen_rows import unseen_notes
+from dynident.diagnosis.nuisances.width_notes import found_widths
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.paired_falls import fall_standard_error, largest_fall
 from dynident.diagnosis.search.path import Path
@@ -95,28 +96,26 @@ def assemble(
     What is known of the model, effect by effect and joint by joint, and the verdict.
     """
     evidence, rounds, path = search.evidence, search.rounds, search.path
-    stages, judged, start = path.stages, path.judged, path.stages[0]
+    judged, start, last = path.judged, path.stages[0], path.stages[-1]
     given = start.model
     rounded = test if test is not None and held is not None else train
     before = with_rounding(judged[0], start, rounded)
-    after = with_rounding(judged[-1], stages[-1], rounded) if path.found else before
-    steps = _steps_of(path, evidence)
+    after = with_rounding(judged[-1], last, rounded) if path.found else before
     helping = [one for one in search.disturbances if one.error_after <= one.error_before]
-    contacts = tuple(one.step(given) for one in helping)
+    contacts = [one.step(given) for one in helping]
     first_error = contacts[0].test_error_before if contacts else before.error
-    steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
+    steps = (*contacts, *_advised(_steps_of(path, evidence), Adviser.of(evidence, last)))
     source = noise_source(evidence, held)
-    trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
+    trained = with_rounding(on_recordings(evidence, last), last, train)
     names, units, judging = given.robot.names, given.robot.torque_units, evidence.criteria.verdict
-    beyond = beyond_reversals(trained, stages[-1].model, stages[-1].values)
-    bursts = bursts_in(beyond, names, units, judging)
+    bursts = bursts_in(beyond_reversals(trained, last.model, last.values), names, units, judging)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], judging, bursts)
-    final = estimate_of(evidence, stages[-1], train)
+    final = estimate_of(evidence, last, train)
     impossible = ()
     if verdict != "unexplained":
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
         verdict = "unexplained" if impossible else verdict
-    limits = _limits(search, held, trained) if verdict == "nothing_missing" else ()
+    widths = found_widths(evidence, last)
     # Where a law is missing, a delay may be no more than a part of it.
     most_of_it = judging.most_explained if verdict == "unexplained" else 0.0
     pushed = contact_candidates(given, evidence, search.disturbances)
@@ -136,13 +135,14 @@ def assemble(
         traces=_traces(given, before, after),
         notes=(
             *(one.sentence(given) for one in helping),
-            *notes_on(evidence, held, stages[-1], source, search.doubtful),
-            *_differing_recordings(trained, after, evidence, held, stages[-1]),
+            *notes_on(evidence, held, last, source, search.doubtful),
+            *widths.notes,
+            *_differing_recordings(trained, after, evidence, held, last),
             *_noise_doubts(evidence, source, rounded, after),
             *burst_notes(bursts_in(trained, names, units, judging), bursts),
             *rounding_notes(after, given.robot.names, judging),
             *notes_on_steps(steps, held),
-            *unseen_notes(evidence, stages[-1], tuple(step.effect.label for step in steps)),
+            *unseen_notes(evidence, last, tuple(step.effect.label for step in steps)),
             *path.notes,
             *search.notes,
         ),
@@ -152,18 +152,21 @@ def assemble(
         withdrawn=path.withdrawn,
         rows=sum(map(rows_of_recordings, filter(None, (train, test))), RowCount()),
         limit=search.limit,
-        detection_limits=limits,
-        sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),
+        detection_limits=_limits(search, held, trained, verdict),
+        sampled=sampling_time(evidence, last, rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
         bursts=tuple(bursts),
+        friction_widths=widths.to_state,
         reversals_left_out=_shares(search, search.doubtful),
         stops_left_out=_shares(search, set(given.robot.names) - set(search.doubtful)),
     )
 
 
-def _limits(search: Search, held: Evidence | None, trained: HeldOut) -> tuple[DetectionLimit, ...]:
+def _limits(
+    search: Search, held: Evidence | None, trained: HeldOut, verdict: Verdict
+) -> tuple[DetectionLimit, ...]:
     """How large effects could have been unseen; what was found, and withdrawn, is no limit."""
-    if search.path.withdrawn:
+    if search.path.withdrawn or verdict != "nothing_missing":
         return ()
     return detection_limits(search.evidence, held, search.path.final, search.rounds[-1], trained)
 

@@ -49,6 +49,7 @@ class Diagnosis(Answer, Shown):
             **({"training_only": list(self.training_only)} if self.training_only else {}),
             **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
             **({"bursts": list(self.bursts)} if self.bursts else {}),
+            **({"friction_widths": dict(self.friction_widths)} if self.friction_widths else {}),
             "joints": [
                 {
                     "name": j.name,

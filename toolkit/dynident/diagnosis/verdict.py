@@ -11,7 +11,6 @@ from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.details import Step
 from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
-from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.diagnosis.search.ranking import Ranking, candidates, carries_noise
 from dynident.evidence.evidence import Evidence, noise_source
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -187,7 +186,7 @@ def notes_on(
             "the others."
         )
     notes += look_alike_notes(evidence, fitted)
-    notes += [*sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted)]
+    notes += sticking_notes(evidence, doubtful)
     first = [run.replicates[0] for run in evidence.runs]
     if any(one.unthinned for one in first):
         rates = listed(sorted({f"{one.parallel.rate_hz:.4g}" for one in first if one.unthinned}))

@@ -15,6 +15,7 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.experiment_design.column_function import is_of_an_instant
 from dynident.experiment_design.open_questions import DESIGNED, open_groups
+from dynident.fitting.reversals.standing_joints import width_advice
 from dynident.reporting.headline import headline
 from dynident.reporting.joint_states import states
 from dynident.tables import listed, percent, points
@@ -62,7 +63,10 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     not_identifiable = [c for c in diagnosis.candidates if c.status == "absorbed"]
     if not found:
         why = "What is left of the torque is noise, and no physics could take it away."
-        found.append(Advice("Nothing is to be added: use the model as it is.", why))
+        what = "Nothing is to be added: use the model as it is."
+        if diagnosis.friction_widths:
+            what = f"Nothing is to be added.{_with_widths(diagnosis)}"
+        found.append(Advice(what, why))
     if not_identifiable:
         many = len(not_identifiable) > 1
         what = (
@@ -181,13 +185,20 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         why += f" The fall with {it} is within two standard errors, and may be chance."
         return [Advice(what, why, (f"dynident compare STUDY {asked}",))]
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
-    what = f"Add {names} to the model, and fit it."
+    what = f"Add {names} to the model, and fit it.{_with_widths(diagnosis)}"
     if any(step.effect.is_payload for group in first for step in group):
         what += (
             " Where the study does not say yet which recordings carry the payload, write payload = "
             "true or false into each of [[recordings]] first."
         )
     return [Advice(what, why, commands)]
+
+
+def _with_widths(diagnosis: Diagnosis) -> str:
+    """What the study has to say first for its fits to be those of the diagnosis."""
+    if not diagnosis.friction_widths:
+        return ""
+    return f" First {width_advice(diagnosis.friction_widths)}"
 
 
 def _addable(diagnosis: Diagnosis) -> list[Step]:

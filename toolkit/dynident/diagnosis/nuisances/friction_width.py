@@ -20,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from dynident.criteria import DEFAULTS
+from dynident.diagnosis.search.candidate_shapes import reshaped
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
@@ -30,6 +31,8 @@ from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
 
 _RIVALS = ("viscous_friction", "quadratic_drag")
+_AROUND = np.array([0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
+"""Times a width that is found beside other dry friction, where both are sought together."""
 _CLEARLY = 3.0
 """Times its price that a width brings by its profile, to be worth it without another fit."""
 
@@ -206,6 +209,8 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
         # The profile holds Coulomb friction alone: other friction at the joint has the width too.
         if _drop(evidence, fitted, other) > _price(fitted):
             fitted = other
+    for joint in dry:
+        fitted = _with_shapes(evidence, fitted, joint)
     return fitted
 
 
@@ -239,6 +244,46 @@ def at_best_widths(evidence: Evidence, fitted: EvidenceFit, joints: Collection[s
         if missed.min() < fitted.error_signal:
             model = model.with_friction_width(joint, float(tried[np.argmin(missed)]))
     return fitted if model is fitted.model else fit_evidence(evidence, model, fitted)
+
+
+def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> EvidenceFit:
+    """The fit with another width at one joint, sought together with other dry friction's shapes.
+
+    Stribeck friction many times too large takes the part of a narrower width: with either held the
+    other has its best value, and both are wrong.
+    """
+    model, robot = fitted.model, fitted.model.robot
+    own, at = evidence.criteria.nuisances, robot.names.index(joint)
+    width, stated = model.friction_widths[at], evidence.model.friction_widths[at]
+    labels = [
+        e.label
+        for e in model.effects
+        if e.joint == joint and e.reverses and e.shape_parameters(robot)
+        if not (e.needs_recording or e.time_varying)
+    ]
+    if not labels:
+        return fitted
+    tried: dict[float, EvidenceFit] = {}
+
+    def missed(x: float) -> float:
+        trial = fit_evidence(evidence, model.with_friction_width(joint, float(np.exp(x))), fitted)
+        for label in labels:
+            effect = next(e for e in trial.model.effects if e.label == label)
+            others = fit_evidence(evidence, trial.model - effect, trial)
+            better = reshaped(evidence, others, trial, effect).effect
+            trial = fit_evidence(evidence, trial.model.with_shapes((better,)), trial)
+        found = in_metric_of(evidence, trial, fitted).error_signal
+        tried[found] = trial
+        return found
+
+    grid = np.log(width * _AROUND)
+    grid = grid[(grid > np.log(own.narrowest_width * stated)) | (_AROUND == 1.0)]
+    values = [missed(x) for x in grid]
+    k = int(np.argmin(values))
+    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])
+    minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 0.02, "maxiter": 12})
+    best = min(tried)
+    return tried[best] if fitted.error_signal - best > _price(fitted) else fitted
 
 
 def _price(fitted: EvidenceFit) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from dynident.diagnosis.nuisances.friction_width import WidthProfile
@@ -12,7 +15,22 @@ from dynident.fitting.reversals.standing_joints import width_advice
 from dynident.tables import number
 
 
-def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
+@dataclass(frozen=True, kw_only=True)
+class FoundWidths:
+    """Friction widths that are other than the given model's.
+
+    Attributes
+    ----------
+    notes : what is said of them.
+    to_state : of every joint, rad/s or m/s, as a study is to have them; empty where its own will
+        do, or the data do not tell others.
+    """
+
+    notes: tuple[str, ...]
+    to_state: Mapping[str, float]
+
+
+def found_widths(evidence: Evidence, fitted: EvidenceFit) -> FoundWidths:
     """Joints whose dry friction has another width than the given model's, in plain words."""
     model, given = fitted.model, evidence.model.friction_widths
     sticking, moving, standing, wider = left_out_at(evidence), [], [], False
@@ -45,10 +63,11 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
             f"Friction width by the rows that count, stops left out: {where}. That is how friction "
             "looks in motion, and no finding of how sharply it reverses."
         )
-    if found:
-        widths = {joint: float(width) for joint, width in (stated | found).items()}
-        notes[-1] += f" Fits take those of the model: for these {width_advice(widths)}"
-    return tuple(notes)
+    if not found:
+        return FoundWidths(notes=tuple(notes), to_state={})
+    widths = {joint: float(width) for joint, width in (stated | found).items()}
+    notes[-1] += f" Fits take those of the model: for these {width_advice(widths)}"
+    return FoundWidths(notes=tuple(notes), to_state=widths)
 
 
 def _interval(profile: WidthProfile, stated: float) -> tuple[float, float]:
