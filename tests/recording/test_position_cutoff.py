@@ -201,6 +201,7 @@ def test_an_order_is_chosen_only_where_it_is_left_open(stated: Filter) -> None:
 
 def test_one_order_is_chosen_for_what_is_compared() -> None:
     fine, coarse = (Dataset((swinging(std, 200.0),), Filter()) for std in (0.0, 1e-3))
+    assert fine.filter is not None and coarse.filter is not None
     assert fine.filter.order > coarse.filter.order == 2
     first, other = filtered_alike(fine, coarse)
     assert first is fine and other.filter == fine.filter
@@ -209,6 +210,7 @@ def test_one_order_is_chosen_for_what_is_compared() -> None:
 
 def test_a_low_pass_of_the_positions_overrules_what_was_chosen_without_one() -> None:
     chosen = Dataset((swinging(1e-3, 200.0),), Filter()).filter
+    assert chosen is not None and chosen.suited_order == 2
     assert replace(chosen, position_cutoff_hz=40.0).order == 8
 
 

@@ -89,7 +89,8 @@ def beyond_reversals(trained: HeldOut, model: Model, values: np.ndarray) -> Held
         turns[1:] = run.v[1:] * run.v[:-1] < 0.0
         turns[:-1] |= turns[1:]
         slow = np.abs(run.v) < model.friction_widths
-        turning = turns | (slow & (maximum_filter1d(turns, 2 * _GAP + 1, axis=0)))
+        near = maximum_filter1d(turns.astype(float), 2 * _GAP + 1, axis=0) > 0.0
+        turning = turns | (slow & near)
         friction = turning & (np.abs(run.residual) <= _BOTH * level)
         runs.append(replace(run, certain=run.certain & ~friction))
     return replace(trained, runs=tuple(runs))
