@@ -33,6 +33,8 @@ from dynident.moments.solution import regression_values
 _RIVALS = ("viscous_friction", "quadratic_drag")
 _AROUND = np.array([0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 """Times a width that is found beside other dry friction, where both are sought together."""
+_OTHER = 0.2
+"""Change of such a width, as a logarithm, that sampling and the drive's noise do not make."""
 _CLEARLY = 3.0
 """Times its price that a width brings by its profile, to be worth it without another fit."""
 
@@ -282,8 +284,12 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     k = int(np.argmin(values))
     bounds = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])
     minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 0.02, "maxiter": 12})
-    best = min(tried)
-    return tried[best] if fitted.error_signal - best > _price(fitted) else fitted
+    # The width has to bring it: the shapes alone may have been short of their best.
+    best, same = min(tried), values[int(np.argmin(np.abs(grid - np.log(width))))]
+    change = abs(np.log(tried[best].model.friction_widths[at] / width))
+    if change > _OTHER and min(same, fitted.error_signal) - best > _price(fitted):
+        return tried[best]
+    return tried[same] if fitted.error_signal - same > _price(fitted) else fitted
 
 
 def _price(fitted: EvidenceFit) -> float:
