@@ -34,9 +34,10 @@ _RIVALS = ("viscous_friction", "quadratic_drag")
 _AROUND = np.array([0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 """Times a width that is found beside other dry friction, where both are sought together."""
 _OTHER = 0.2
-"""Change of such a width, as a logarithm, that sampling and the drive's noise do not make."""
+"""Change of such a width, as a logarithm, that sampling and the drive's noise do not make: a smaller
+one has to be worth it by far."""
 _CLEARLY = 3.0
-"""Times its price that a width brings by its profile, to be worth it without another fit."""
+"""Times its price that a width brings to be worth it by far: by its profile, without another fit."""
 
 
 class FrictionWidthColumn(JointEffect):
@@ -287,7 +288,8 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     # The width has to bring it: the shapes alone may have been short of their best.
     best, same = min(tried), values[int(np.argmin(np.abs(grid - np.log(width))))]
     change = abs(np.log(tried[best].model.friction_widths[at] / width))
-    if change > _OTHER and min(same, fitted.error_signal) - best > _price(fitted):
+    price = _price(fitted) * (1.0 if change > _OTHER else _CLEARLY)
+    if min(same, fitted.error_signal) - best > price:
         return tried[best]
     return tried[same] if fitted.error_signal - same > _price(fitted) else fitted
 
