@@ -34,10 +34,10 @@ _RIVALS = ("viscous_friction", "quadratic_drag")
 _AROUND = np.array([0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 """Times a width that is found beside other dry friction, where both are sought together."""
 _OTHER = 0.2
-"""Change of such a width, as a logarithm, that sampling and the drive's noise do not make: a smaller
-one has to be worth it by far."""
+"""Change of such a width, as a logarithm, that sampling and noise of the drive do not make: less of
+it has to be worth it by far."""
 _CLEARLY = 3.0
-"""Times its price that a width brings to be worth it by far: by its profile, without another fit."""
+"""Times its price that a width brings which is worth it by far: its profile needs no other fit."""
 
 
 class FrictionWidthColumn(JointEffect):
