@@ -18,6 +18,7 @@ from dynident.fitting.reversals.standing_joints import (
     too_wide_note,
     without_stops,
 )
+from dynident.fitting.reversals.unsuited_width import with_unsuited_width
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
@@ -109,6 +110,8 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
         said = (estimate.headline, judged.headline if judged is not None else "")
         estimate = replace(estimate, headline=" ".join(filter(None, said)))
+    elif not estimate.headline:
+        estimate = with_unsuited_width(estimate, dataset, method)
     notes = (
         standing_note(counted),
         too_wide_note(model, counted),
