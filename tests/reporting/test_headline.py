@@ -8,6 +8,8 @@ import pytest
 
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.sampling_time import SamplingTime
+from dynident.diagnosis.proposals.proposal import Proposal
+from dynident.effects import Law, law_effect
 from dynident.reporting.content import step_groups
 from dynident.reporting.glossary import glossary
 from dynident.reporting.headline import headline
@@ -95,6 +97,49 @@ def test_a_joint_that_is_too_fast_comes_first():
         assert headline(doubted).mark != "\u2713"
         assert "q.elbow" in next_steps(doubted)[0].what
         assert doubted.track_record is None
+
+
+def test_where_reversals_are_left_out_no_model_is_called_right():
+    found = of_kind("nothing_missing", False, noise=True)
+    small = replace(found.test_error, before=found.test_error.noise_floor)
+    one = replace(found, test_error=small, reversals_left_out={"elbow": 0.43})
+    assert replace(one, reversals_left_out={}).track_record is not None
+    assert one.track_record is None
+    assert one.sentence.startswith("Nothing is missing away from the reversals of elbow:")
+    assert "reversals of elbow (43 % of its rows)" in one.sentence
+    head, (first, *_) = headline(one), next_steps(one)
+    assert head.mark == "?" and "away from reversals" in head.title
+    assert "Nothing is missing:" not in head.sentence + one.sentence
+    assert "do not trust the model of elbow" in first.what and "use the model" not in first.what
+
+
+def test_what_a_law_makes_superfluous_is_not_advised():
+    found = of_kind("unexplained", True, noise=True)
+    label = found.steps[0].effect.label
+    law = law_effect(Law(name="proposal1", torque="c*v*q"))("elbow").on(found.before.model.robot)
+    proposal = Proposal(
+        effect=law,
+        values=(1.0,),
+        sigma=(0.1,),
+        shape_sigma=(),
+        explains=0.9,
+        is_explanation=True,
+        p_value=0.0,
+        tried=900,
+        test_error_before=0.0117,
+        test_error_after=0.0086,
+        noise_floor=0.0085,
+    )
+    besides = replace(found, proposals=(proposal,))
+    instead = replace(found, proposals=(replace(proposal, instead_of=(label,)),))
+    first, second = (next_steps(one)[0] for one in (besides, instead))
+    assert any(label in command for command in first.commands)
+    assert second.what.startswith(f"Do not add {label} yet.") and "0.86 %" in second.what
+    assert second.commands == ("dynident add STUDY --proposal 1",)
+    others = [one.commands for one in next_steps(instead)]
+    assert not any(label in command for commands in others for command in commands)
+    assert f"in the place of {label} takes it to 0.86 %" in headline(instead).sentence
+    assert "in the place of" not in headline(besides).sentence
 
 
 def test_that_the_catalogue_lacks_it_is_not_said_of_what_was_withdrawn():

@@ -192,10 +192,13 @@ class Answer:
         each = [f"{joint} ({percent(x, 0)} of its rows)" for joint, x in shares]
         if not each:
             return ()
-        return (
-            f"That leaves out the reversals of {', '.join(each)}, where dry friction may follow "
-            "another law than the model's.",
-        )
+        law = "where dry friction may follow another law than the model's"
+        if self.only_reversals_left:
+            return (
+                f"Left out are the reversals of {', '.join(each)}, {law}: which, or what looks "
+                "like one, these data do not tell.",
+            )
+        return (f"That leaves out the reversals of {', '.join(each)}, {law}.",)
 
     @property
     def not_judged_in_words(self) -> tuple[str, ...]:
@@ -290,7 +293,18 @@ class Answer:
                 f"withdrawn: {self._withdrawn_titles}. Missing may be {several}something that "
                 "differs between recordings, or what the catalogue does not have."
             )
+        if self.only_reversals_left:
+            where = listed(list(self.reversals_left_out))
+            return (
+                f"Nothing is missing away from the reversals of {where}: what remains there is "
+                "within the noise."
+            )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    @property
+    def only_reversals_left(self) -> bool:
+        """Whether all is well but at reversals, which are left out."""
+        return self.verdict == "nothing_missing" and bool(self.reversals_left_out)
 
     @property
     def only_bursts(self) -> bool:
@@ -362,6 +376,7 @@ class Answer:
             or self.training_only  # no answer that was counted is of this kind
             or self.only_withdrawn
             or self.too_fast is not None
+            or self.reversals_left_out  # of these rows nothing is claimed
             or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
         ):
             return None

@@ -177,9 +177,9 @@ def limit_table(limits: tuple[DetectionLimit, ...]) -> Table:
             largest_in_words(limits),
             *(("A dash: not looked for there, or nothing that this motion could show.",) * dashes),
             "Along the recorded motion: others show less or more of an effect. The noise of a "
-            "single recording moves a limit by up to a third. Of an effect with a shape (the speed "
-            "of Stribeck friction, the period of a ripple) it is that of the shape seen first: of "
-            "another, more may stay unseen.",
+            "single recording moves a limit by up to a third. The limit of an effect with a shape "
+            "(the speed of Stribeck friction, the period of a ripple) is that of the shape that "
+            "shows best: with another shape, a larger effect may stay unseen.",
         ),
     )
 

@@ -65,7 +65,7 @@ def headline(diagnosis: Diagnosis) -> Headline:
         found = replace(found, mark=mark, sentence=said)
     if diagnosis.reversals_left_out:
         mark = "?" if found.mark == "\u2713" else found.mark
-        where = " and ".join(diagnosis.reversals_left_out)
+        where = listed(list(diagnosis.reversals_left_out))
         said = f"{found.sentence} The reversals of {where} are left out: see the notes."
         found = Headline(mark, found.title, said)
     if diagnosis.not_judged_in_words:
@@ -109,10 +109,19 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
         return Headline("?", f"{title}, noise unknown", f"{found}.{more} {_NOT_KNOWN}")
     if diagnosis.verdict == "unexplained":
         none = "" if stopped else " unexplained"
-        said = f"{found}, and a residual beyond the noise remains{none}."
+        said = f"{found}, and a residual beyond the noise remains{none}.{_instead(diagnosis)}"
         return Headline("!", f"{title}, a residual remains", said)
     remains = f"what remains is {diagnosis.rest}{_MORE[diagnosis.rest]}"
     return Headline("\u2713", title, f"{found}; {remains}.")
+
+
+def _instead(diagnosis: Diagnosis) -> str:
+    """That a law is proposed in the place of effects that were added; empty where none is."""
+    proposals = [one for one in diagnosis.proposals if one.instead_of]
+    if not proposals:
+        return ""
+    after = percent(proposals[0].test_error_after)
+    return f" A law in the place of {listed(list(proposals[0].instead_of))} takes it to {after}."
 
 
 def _title(diagnosis: Diagnosis) -> str:
@@ -166,6 +175,9 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         if diagnosis.withdrawn:
             said = f"Held-out data confirm nothing that is missing, and what remains is {rest}."
             return Headline("?", "no missing effect is confirmed", said)
+        if diagnosis.only_reversals_left:
+            said = f"Nothing is missing away from reversals: what remains there is {rest}."
+            return Headline("?", "nothing is missing away from reversals", said)
         said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)
     error = percent(diagnosis.test_error.after)

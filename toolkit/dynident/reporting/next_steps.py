@@ -47,7 +47,8 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     # Friction and inertia have taken up a wrong moment: whatever is added comes after that.
-    found = [*_to_settle(diagnosis), *_to_time(diagnosis), *_to_add(diagnosis)]
+    instead, besides = _to_try(diagnosis)
+    found = [*_to_settle(diagnosis), *_to_time(diagnosis), *instead, *_to_add(diagnosis)]
     if diagnosis.limit is not None and diagnosis.too_fast is None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
@@ -57,16 +58,12 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source == "unknown":
         found.append(_to_repeat(diagnosis))
-    found += [*_to_separate(diagnosis), *_to_try(diagnosis), *_to_add_after(diagnosis)]
+    found += [*_to_separate(diagnosis), *besides, *_to_add_after(diagnosis)]
     if diagnosis.noise_source == "given":
         found.append(_to_repeat(diagnosis))
     not_identifiable = [c for c in diagnosis.candidates if c.status == "absorbed"]
     if not found:
-        why = "What is left of the torque is noise, and no physics could take it away."
-        what = "Nothing is to be added: use the model as it is."
-        if diagnosis.friction_widths:
-            what = f"Nothing is to be added.{_with_widths(diagnosis)}"
-        found.append(Advice(what, why))
+        found.append(_all_is_well(diagnosis))
     if not_identifiable:
         many = len(not_identifiable) > 1
         what = (
@@ -82,6 +79,22 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
             )
         )
     return tuple(found)
+
+
+def _all_is_well(diagnosis: Diagnosis) -> Advice:
+    """What to do where nothing is to be added; reversals may be left out."""
+    widths = _with_widths(diagnosis) if diagnosis.friction_widths else ""
+    if diagnosis.reversals_left_out:
+        where = listed(list(diagnosis.reversals_left_out))
+        what = (
+            f"Nothing of the catalogue is to be added.{widths} Where it reverses, do not trust the "
+            f"model of {where}: record reversals at several accelerations, which tell one law of "
+            "dry friction from another."
+        )
+        return Advice(what, "Away from them what is left of the torque is noise.")
+    what = "Nothing is to be added" + (f".{widths}" if widths else ": use the model as it is.")
+    why = "What is left of the torque is noise, and no physics could take it away."
+    return Advice(what, why)
 
 
 def of_study(advice: Sequence[Advice], study: Path | str) -> tuple[Advice, ...]:
@@ -204,15 +217,18 @@ def _with_widths(diagnosis: Diagnosis) -> str:
 def _addable(diagnosis: Diagnosis) -> list[Step]:
     """What the study can take up: no event of one recording, and no gain that is fitted anyway.
 
-    Nothing before it is settled whose positions these are.
+    Nothing before it is settled whose positions these are, and nothing in whose place a law is
+    proposed.
     """
     if diagnosis.too_fast is not None:
         return []
+    superfluous = diagnosis.proposals[0].instead_of if diagnosis.proposals else ()
     fitted = set() if diagnosis.drives is None else set(diagnosis.drives.joints)
     return [
         step
         for step in diagnosis.steps
         if step.effect.found_by != "repetition"
+        and step.effect.label not in superfluous
         and not (step.effect.name == "drive_gain" and step.effect.joint in fitted)
     ]
 
@@ -284,18 +300,26 @@ def _told_by_motions(diagnosis: Diagnosis) -> list[tuple[Effect, ...]]:
     return [one for one in groups if not advice[one[0].label].startswith(settled)]
 
 
-def _to_try(diagnosis: Diagnosis) -> list[Advice]:
-    """Proposed laws, of which a robot knows nothing yet."""
-    found = []
+def _to_try(diagnosis: Diagnosis) -> tuple[list[Advice], list[Advice]]:
+    """Proposed laws, of which a robot knows nothing yet: in the place of effects, and besides."""
+    instead, besides = [], []
     proposals = diagnosis.proposals if diagnosis.too_fast is None else ()
     for number, one in enumerate(proposals, 1):
-        what = f"Ask yourself whether {one.effect.joint} can have the torque {one.torque}."
+        what = f"Ask yourself whether {one.effect.joint} can have the torque {one.torque}"
         why = (
             "It was found among many terms and fits: a mechanism that makes it is what would make "
             "it a finding. So would another recording, of which it takes as much."
         )
-        found.append(Advice(what, why, (f"dynident add STUDY --proposal {number}",)))
-    return found
+        command = f"dynident add STUDY --proposal {number}"
+        if not one.instead_of or instead:
+            besides.append(Advice(f"{what}.", why, (command,)))
+            continue
+        what = (
+            f"Do not add {listed(list(one.instead_of))} yet. {what}: with it alone the error falls "
+            f"from {percent(one.test_error_before)} to {percent(one.test_error_after)}."
+        )
+        instead.append(Advice(what, why, (command,)))
+    return instead, besides
 
 
 def _either(effects: tuple[Effect, ...]) -> str:

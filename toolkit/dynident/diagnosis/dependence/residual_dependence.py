@@ -232,8 +232,9 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         rows,
         (
             f"{noise} Each with its standard error over the blocks. In brackets: what cannot be "
-            "told from nothing, at the level of 5 % over all sets of inputs, or is below 1 %; it "
-            "is not taken off what none of these explains: all of it, where nothing is told.",
+            "told from nothing, at the level of 5 % over all sets of inputs, or is below 1 %. "
+            "Such shares count under \u201cnone of these\u201d, which is 100 % where all are in "
+            "brackets.",
             "Each share is what inputs add to those before them that are told: what two sets "
             "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
             "acceleration and load where it explains more. Negative shares are shown as 0.",
