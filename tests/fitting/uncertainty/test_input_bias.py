@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +16,7 @@ from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
 from dynident.fitting.uncertainty.trembling import trembling
 from dynident.model import Model
 from dynident.moments.factors import factorise
-from dynident.recording import Dataset, Filter, Noise, Recording, lowpass
+from dynident.recording import Dataset, Filter, Noise, Recording, default_filter, lowpass
 from dynident.recording.white_noise import encoder_noise_std
 from synthetic import arm, synthetic
 
@@ -69,6 +69,18 @@ def test_a_robot_that_follows_its_encoders_is_told_from_noise_in_the_columns() -
     found = fit(lab.model(), one)
     assert found.headline.startswith("The robot trembles")
     assert "Fc@elbow" in found.headline and "position_cutoff_hz" not in found.headline
+
+
+def test_a_low_pass_that_hides_the_motion_is_not_called_a_trembling_robot() -> None:
+    (loud,) = recorded(2 * LOUDER)
+    (quiet,) = lab.Lab(torque_std=(0.2, 0.08), position_std=1e-6, seconds=6.0).recordings(range(1))
+    low = Filter(position_cutoff_hz=5.0, cutoff_hz=5.0, rate_hz=20.0, ends="keep")
+    found = fit(lab.model(), Dataset((quiet,), low))
+    assert found.headline.startswith("The low-pass of the positions hides motion")
+    assert "leave position_cutoff_hz = 5 out of [filter]" in found.headline
+    assert not fit(lab.model(), quiet).headline
+    usual = replace(default_filter(lab.RATE), position_cutoff_hz=30.0)
+    assert fit(lab.model(), Dataset((loud,), usual)).headline.startswith("The robot trembles")
 
 
 def test_the_trembling_is_that_of_the_true_motion() -> None:

@@ -25,7 +25,7 @@ from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.uncertainty.expected_bias import listed, reported
 from dynident.fitting.uncertainty.noisy_part import NoisyPart
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, default_filter
+from dynident.recording import Dataset, Recording, default_filter, suited_filter, uniform
 from dynident.tables import number
 
 _MOST = 16384
@@ -39,6 +39,8 @@ foretold to about a third (measured on simulated two-link arms that follow their
 _LEAST = 0.1
 """Share of signal in a direction below which the correction is not carried on: there the bias is
 nine times what is left at least."""
+_LOW = 0.7
+"""Times the cut-off that suits recordings, below which a filter hides motion that it need not."""
 _NAMED = 4
 
 
@@ -53,7 +55,8 @@ class InputBias:
     trembling : (p,) the part of it that filters hide.
     sigma : (p,) standard deviations without it; NaN where a parameter is not identified.
     position_std : (n,) of the encoders' noise, rad or m.
-    filtered : whether the positions passed a low-pass.
+    cutoff_hz : of the positions' low-pass; None without one.
+    suited_hz : the one that suits the recordings, where a bias is to be said; None where it is not.
     """
 
     model: Model
@@ -61,7 +64,8 @@ class InputBias:
     trembling: np.ndarray
     sigma: np.ndarray
     position_std: np.ndarray
-    filtered: bool
+    cutoff_hz: float | None
+    suited_hz: float | None = None
 
     @property
     def ratio(self) -> np.ndarray:
@@ -84,11 +88,8 @@ class InputBias:
         known = "sigma holds that"
         if self.ratio.max() > _ROUGH:
             known = "sigma holds that roughly, and gives no 95 % intervals"
-        blunted = np.abs(self.trembling[worst[0]]) > np.abs(self.values[worst[0]]) / 2
-        why = "Noise in the positions biases this fit"
-        if blunted:
-            why = "The robot trembles under the noise of its encoders, which biases this fit"
-        return f"{why}: {', '.join(parts)}{more}; {known}. {self._remedy(bool(blunted))}"
+        why, remedy = self._reason(worst[0])
+        return f"{why}: {', '.join(parts)}{more}; {known}. {remedy}"
 
     @property
     def note(self) -> str:
@@ -108,18 +109,28 @@ class InputBias:
         more = " The bias to be expected of noise in the positions is in sigma, too."
         return others + more if self.note else others
 
-    def _remedy(self, blunted: bool) -> str:
-        if blunted:
+    def _reason(self, worst: int) -> tuple[str, str]:
+        """Why the fit is biased, most of all in one parameter, a clause; and what mends that."""
+        if np.abs(self.trembling[worst]) > np.abs(self.values[worst]) / 2:
+            cutoff, suited = self.cutoff_hz, self.suited_hz
+            if cutoff and suited and cutoff < _LOW * suited:
+                return (
+                    "The low-pass of the positions hides motion, which biases this fit",
+                    f"Remedy: leave position_cutoff_hz = {cutoff:.4g} out of [filter]; "
+                    f"{suited:.3g} Hz suits these recordings.",
+                )
             return (
+                "The robot trembles under the noise of its encoders, which biases this fit",
                 "No filter of the record undoes it: let the drive follow its encoders less (a "
-                "lower gain on their differences)."
+                "lower gain on their differences).",
             )
         way = "lower position_cutoff_hz in [filter]"
-        if not self.filtered:
+        if not self.cutoff_hz:
             way = "state position_cutoff_hz in [filter]"
         return (
+            "Noise in the positions biases this fit",
             f"Remedy: {way}, or take a method that allows for noisy positions (--method iv, or "
-            "corrected with --input-noise encoders)."
+            "corrected with --input-noise encoders).",
         )
 
 
@@ -155,14 +166,18 @@ def input_bias(
     whole[kept] = sums.bias(sums.noise + sums.hidden)
     noise_alone[kept] = sums.bias(sums.noise)
     settings = dataset.filter or default_filter(dataset.recordings[0].rate_hz)
-    return InputBias(
+    found = InputBias(
         model=model,
         values=whole,
         trembling=whole - noise_alone,
         sigma=sigma,
         position_std=np.sqrt(np.mean(np.square(stds), axis=0)),
-        filtered=settings.position_cutoff_hz is not None,
+        cutoff_hz=settings.position_cutoff_hz,
     )
+    if found.cutoff_hz is None or not found.headline:
+        return found
+    recordings = [uniform(one) for one in dataset.recordings]
+    return replace(found, suited_hz=suited_filter(recordings).position_cutoff_hz)
 
 
 def _products_of_recording(
