@@ -14,6 +14,7 @@ from dynident.evidence.held_out import on_recordings
 from dynident.evidence.model_columns import rows_of_run
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
+from dynident.fitting.uncertainty.granted_effects import with_granted_effects
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
@@ -49,7 +50,8 @@ def estimate_of(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Esti
         for joint, stated, found in zip(fitted.model.robot.names, given, own, strict=True)
         if found != stated
     ]
-    return with_shape_errors(_estimate(evidence, fitted, train), again, sought)
+    found = with_shape_errors(_estimate(evidence, fitted, train), again, sought)
+    return with_granted_effects(found, again)
 
 
 def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:

@@ -20,6 +20,7 @@ from dynident.fitting.reversals.standing_joints import (
 )
 from dynident.fitting.reversals.unsuited_width import with_unsuited_width
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
+from dynident.fitting.uncertainty.granted_effects import with_granted_effects
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
@@ -122,10 +123,12 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
 
 
 def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:
+    again = (lambda one: method.fit(one, dataset)) if isinstance(method, LeastSquares) else None
     if not shaped_effects(model):
-        return method.fit(model, dataset)
-    shaped = refine_shapes(model, dataset)
-    estimate = method.fit(shaped.model, dataset)
-    estimate = replace(estimate, status=f"{estimate.status}, {shaped.status}")
-    again = isinstance(method, LeastSquares)
-    return with_shape_errors(estimate, (lambda one: method.fit(one, dataset)) if again else None)
+        estimate = method.fit(model, dataset)
+    else:
+        shaped = refine_shapes(model, dataset)
+        estimate = method.fit(shaped.model, dataset)
+        estimate = replace(estimate, status=f"{estimate.status}, {shaped.status}")
+        estimate = with_shape_errors(estimate, again)
+    return with_granted_effects(estimate, again) if again else estimate
