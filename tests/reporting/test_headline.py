@@ -113,6 +113,15 @@ def test_where_reversals_are_left_out_no_model_is_called_right():
     assert "do not trust the model of elbow" in first.what and "use the model" not in first.what
 
 
+def test_what_is_added_is_said_with_what_these_data_do_not_tell_it_from():
+    found = of_kind("explained", True, noise=True)
+    one = replace(found.steps[0], indistinguishable=(effect("drive_gain", "elbow"),))
+    alike = replace(found, steps=(one, *found.steps[1:]))
+    told = f"These data do not tell {one.effect.title} from drive gain at elbow."
+    assert told in next_steps(alike)[0].what
+    assert "do not tell" not in next_steps(found)[0].what
+
+
 def test_what_a_law_makes_superfluous_is_not_advised():
     found = of_kind("unexplained", True, noise=True)
     label = found.steps[0].effect.label

@@ -198,13 +198,24 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         why += f" The fall with {it} is within two standard errors, and may be chance."
         return [Advice(what, why, (f"dynident compare STUDY {asked}",))]
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
-    what = f"Add {names} to the model, and fit it.{_with_widths(diagnosis)}"
+    what = f"Add {names} to the model, and fit it.{_untold(first)}{_with_widths(diagnosis)}"
     if any(step.effect.is_payload for group in first for step in group):
         what += (
             " Where the study does not say yet which recordings carry the payload, write payload = "
             "true or false into each of [[recordings]] first."
         )
     return [Advice(what, why, commands)]
+
+
+def _untold(groups: Sequence[Sequence[Step]]) -> str:
+    """What may be there instead of effects to add; empty where each is told from all others."""
+    each = [
+        f"{step.effect.title} from {_either(step.indistinguishable)}"
+        for group in groups
+        for step in group
+        if step.indistinguishable
+    ]
+    return f" These data do not tell {_few_of(each)}." if each else ""
 
 
 def _with_widths(diagnosis: Diagnosis) -> str:
