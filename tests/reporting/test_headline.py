@@ -115,11 +115,13 @@ def test_where_reversals_are_left_out_no_model_is_called_right():
 
 def test_what_is_added_is_said_with_what_these_data_do_not_tell_it_from():
     found = of_kind("explained", True, noise=True)
-    one = replace(found.steps[0], indistinguishable=(effect("drive_gain", "elbow"),))
-    alike = replace(found, steps=(one, *found.steps[1:]))
+    first, *rest = found.steps
+    one = replace(first, indistinguishable=(effect("drive_gain", "elbow"),))
+    told_apart = (replace(step, indistinguishable=()) for step in (first, *rest))
+    alike, apart = replace(found, steps=(one, *rest)), replace(found, steps=tuple(told_apart))
     told = f"These data do not tell {one.effect.title} from drive gain at elbow."
     assert told in next_steps(alike)[0].what
-    assert "do not tell" not in next_steps(found)[0].what
+    assert "do not tell" not in next_steps(apart)[0].what
 
 
 def test_what_a_law_makes_superfluous_is_not_advised():
