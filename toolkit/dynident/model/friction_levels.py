@@ -1,7 +1,7 @@
-"""Whether dry friction may have the levels that a model's values say.
+"""Levels of dry friction that a model's values say, and whether it may have them.
 
-In: a model, its values with their covariance, and the torques that moved its joints. Out: levels
-that these joints would not have overcome.
+In: a model, its values with their covariance, and the torques that moved its joints. Out: levels,
+and which of them these joints would not have overcome.
 """
 
 from __future__ import annotations
@@ -15,6 +15,28 @@ from dynident.effects import Parameter
 from dynident.model.possible_values import Impossible
 from dynident.model.torque_model import Model
 from dynident.tables import number
+
+
+def dry_joints(model: Model) -> tuple[str, ...]:
+    """Joints that have Coulomb friction in a model, in its order."""
+    return tuple(one for one in model.robot.names if _coulomb(one) in model.slices)
+
+
+def coulomb_levels(model: Model, values: np.ndarray) -> np.ndarray:
+    """Return the Coulomb friction of each joint, (n,) N m or N; zero where a model has none.
+
+    Parameters
+    ----------
+    model, values : (p,) of its parameters.
+    """
+    found = np.zeros(model.robot.n)
+    for joint in dry_joints(model):
+        found[model.robot.names.index(joint)] = values[model.slices[_coulomb(joint)].start]
+    return found
+
+
+def _coulomb(joint: str) -> str:
+    return f"coulomb_friction@{joint}"
 
 
 def levels_not_met(

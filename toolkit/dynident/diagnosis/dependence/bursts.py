@@ -19,7 +19,7 @@ from scipy.ndimage import maximum_filter1d
 
 from dynident.criteria import VerdictCriteria
 from dynident.evidence.held_out import HeldOut, HeldOutRun
-from dynident.model import Model
+from dynident.model import Model, coulomb_levels
 from dynident.tables import listed, percent
 
 _BEYOND = 5.0
@@ -79,11 +79,7 @@ def beyond_reversals(trained: HeldOut, model: Model, values: np.ndarray) -> Held
     trained : what a model leaves.
     model, values : (p,) that model, with its friction widths.
     """
-    level = np.zeros(model.robot.n)
-    for j, joint in enumerate(model.robot.names):
-        if (place := model.slices.get(f"coulomb_friction@{joint}")) is not None:
-            level[j] = values[place.start]
-    runs = []
+    level, runs = coulomb_levels(model, values), []
     for run in trained.runs:
         turns = np.zeros(run.v.shape, dtype=bool)
         turns[1:] = run.v[1:] * run.v[:-1] < 0.0

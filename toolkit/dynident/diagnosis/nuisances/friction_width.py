@@ -26,7 +26,7 @@ from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
-from dynident.model import Model
+from dynident.model import Model, dry_joints
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
 
@@ -238,7 +238,7 @@ def at_best_widths(evidence: Evidence, fitted: EvidenceFit, joints: Collection[s
     for joint, stated, usual in zip(
         model.robot.names, evidence.model.friction_widths, np.std(speed, axis=0), strict=True
     ):
-        if joint not in joints or f"coulomb_friction@{joint}" not in model.slices:
+        if joint not in joints or joint not in dry_joints(model):
             continue
         profile = WidthProfile(evidence, fitted, joint)
         widest = max(own.widest_width * stated, usual)

@@ -31,7 +31,7 @@ from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, signal_by_joint
-from dynident.model import Model
+from dynident.model import Model, dry_joints
 
 _STEP, _STEP_OF_RANGE = 0.3, 0.025
 """First steps of a search for a shape, of a logarithm or of the range."""
@@ -95,7 +95,7 @@ def laws_that_do_as_well(
     """
     model = fitted.model
     joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
-    dry = [joint for joint in joints if f"coulomb_friction@{joint}" in model.slices]
+    dry = [joint for joint in joints if joint in dry_joints(model)]
     gates = evidence.criteria.gates
     # What it explains more than they do must itself be worth an effect.
     least = (gates.later_share if added else gates.first_share) * fitted.error_total
@@ -168,9 +168,9 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     least = evidence.criteria.gates.later_share * fitted.error_total
     if fitted.error_signal < least:
         return ()
-    quiet, names = joints_below_noise(evidence, fitted), fitted.model.robot.names
-    dry = [one for one in names if f"coulomb_friction@{one}" in fitted.model.slices]
-    every = (_best_law(evidence, fitted, joint) for joint in dry if joint not in quiet)
+    quiet = joints_below_noise(evidence, fitted)
+    dry = (joint for joint in dry_joints(fitted.model) if joint not in quiet)
+    every = (_best_law(evidence, fitted, joint) for joint in dry)
     return tuple(law for law in every if law.drop >= least and not law.lags and law.lead_s < LATEST)
 
 

@@ -31,6 +31,7 @@ from dynident.fitting.reversals.standing_joints import (
     resting,
     stands,
 )
+from dynident.model import dry_joints
 from dynident.tables import listed
 
 NearStop = Callable[[Evidence, Run, int, float], np.ndarray]
@@ -83,7 +84,7 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     return tuple(
         joint
         for j, joint in enumerate(model.robot.names)
-        if f"coulomb_friction@{joint}" in model.slices
+        if joint in dry_joints(model)
         and (
             model.friction_widths[j] <= resolved[j]
             or standing[j]

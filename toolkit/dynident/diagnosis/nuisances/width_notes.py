@@ -12,6 +12,7 @@ from dynident.diagnosis.nuisances.sticking import left_out_at
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.fitting.reversals.standing_joints import width_advice
+from dynident.model import dry_joints
 from dynident.tables import number
 
 
@@ -38,7 +39,7 @@ def found_widths(evidence: Evidence, fitted: EvidenceFit) -> FoundWidths:
     found: dict[str, float] = {}
     for joint, unit in zip(model.robot.names, model.robot.units, strict=True):
         profile = WidthProfile(evidence, fitted, joint)
-        if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated[joint]:
+        if joint not in dry_joints(model) or profile.width == stated[joint]:
             continue
         if f"presliding@{joint}" in model.slices:
             continue  # presliding tells how friction reverses: the width is of what is beside it

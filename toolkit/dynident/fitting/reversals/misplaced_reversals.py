@@ -20,6 +20,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.reversals.joint_speeds import JointSpeeds
 from dynident.fitting.reversals.standing_joints import few_enough, resting, with_stops
 from dynident.fitting.sampling import Sampled, sample
+from dynident.model import coulomb_levels
 from dynident.recording import Dataset, Recording, lowpass, uniform
 from dynident.tables import listed, number, percent
 
@@ -58,13 +59,8 @@ class _Friction:
     @classmethod
     def of(cls, estimate: Estimate) -> _Friction:
         """Return what an estimate says of it; a level of zero where it says nothing."""
-        model = estimate.model
-        level = np.zeros(model.robot.n)
-        for j, joint in enumerate(model.robot.names):
-            place = model.slices.get(f"coulomb_friction@{joint}")
-            if place is not None:
-                level[j] = estimate.values[place.start]
-        return cls(level, np.array(model.friction_widths, dtype=float))
+        level = coulomb_levels(estimate.model, estimate.values)
+        return cls(level, np.array(estimate.model.friction_widths, dtype=float))
 
     def misplaced(self, sampled: Sampled) -> Iterator[np.ndarray]:
         """Yield its expected error in the rows that are used, (T, n) N m or N, part by part."""

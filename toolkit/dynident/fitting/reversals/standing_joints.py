@@ -17,7 +17,7 @@ from dynident.criteria import DEFAULTS, StickingCriteria
 from dynident.fitting.reversals.joint_speeds import JointSpeeds
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
 from dynident.formulas import quoted_joint
-from dynident.model import Model
+from dynident.model import Model, dry_joints
 from dynident.recording import Dataset, Filter, Recording, uniform
 from dynident.recording.position_cutoff import DIGITS
 from dynident.recording.white_noise import encoder_noise_std
@@ -159,15 +159,12 @@ def without_stops(
     if not recordings or keeps or any(one.stops for one in recordings):
         return dataset
     models = [model] if isinstance(model, Model) else list(model)
-    dry = [
-        any(f"coulomb_friction@{joint}" in one.slices for one in models)
-        for joint in models[0].robot.names
-    ]
-    if not any(dry):
+    dry = np.isin(models[0].robot.names, [joint for one in models for joint in dry_joints(one)])
+    if not dry.any():
         return dataset
     recordings, criteria = tuple(uniform(one) for one in recordings), DEFAULTS.sticking
     known = np.isin(models[0].robot.names, list(standing))
-    which = np.array(dry) & (known | stands(_speeds(recordings, dataset.filter), criteria))
+    which = dry & (known | stands(_speeds(recordings, dataset.filter), criteria))
     if not which.any():
         return dataset
     rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])

@@ -16,6 +16,7 @@ from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.uncertainty.shape_slopes import width_slope
+from dynident.model import coulomb_levels, dry_joints
 from dynident.recording import Dataset
 from dynident.tables import listed, number
 
@@ -64,8 +65,7 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
     method : that it was fitted with.
     """
     model, robot = estimate.model, estimate.model.robot
-    dry = [one for one in robot.names if f"coulomb_friction@{one}" in model.slices]
-    slopes = [width_slope(model, estimate.values, one) for one in dry]
+    slopes = [width_slope(model, estimate.values, one) for one in dry_joints(model)]
     added = tuple(one for one in slopes if one is not None)
     keeps = dataset.filter is not None and dataset.filter.ends == "keep"
     if not added or keeps or method.errors == "independent":
@@ -77,11 +77,11 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
         with np.errstate(divide="ignore", invalid="ignore"):
             change = wide.values / wide.sigma
             off = (wide.values[: model.size] - given.values) / given.sigma
+        levels = coulomb_levels(model, off)
         for slope in added:
             at = wide.model.slices[slope.label].start
-            level = model.slices[f"coulomb_friction@{slope.joint}"].start
-            if abs(change[at]) > _CLEARLY and abs(off[level]) > _MATTERS:
-                j = robot.names.index(str(slope.joint))
+            j = robot.names.index(str(slope.joint))
+            if abs(change[at]) > _CLEARLY and abs(levels[j]) > _MATTERS:
                 width = f"{number(float(model.friction_widths[j]), 2)} {robot.units[j]}/s"
                 found.append(_Unsuited(str(slope.joint), width, float(change[at])))
     if not found:
