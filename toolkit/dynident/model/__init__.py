@@ -5,8 +5,8 @@ the robot that their values describe, and the columns of the regression (`torque
 the one place that knows in which order columns can be evaluated: those of effects that make the
 torque, along the bodies that the values describe, then those of effects that depend on the
 torque; and of a whole recording once. Whether values are possible together say
-`possible_values` and `friction_levels`, which knows the Coulomb friction of each joint; `InertiaMatrices` are the joint-space inertia that they
-describe.
+`possible_values` and `friction_levels`, which knows the Coulomb friction of each joint;
+`InertiaMatrices` are the joint-space inertia that they describe.
 """
 
 from dynident.model.friction_levels import coulomb_levels, dry_joints, levels_not_met, not_met
