@@ -29,7 +29,7 @@ from dynident.cli.work import (
 from dynident.errors import FileError, StudyError
 
 if TYPE_CHECKING:
-    from dynident.diagnosis.stage import Propose
+    from dynident.diagnosis.extension.stage import Propose
     from dynident.effects import Law
 
 _PATH = click.Path(path_type=Path)

@@ -18,7 +18,7 @@ from dynident.tables import printable
 
 if TYPE_CHECKING:
     from dynident.diagnosis import Diagnosis
-    from dynident.diagnosis.stage import AskedSwitches, Propose
+    from dynident.diagnosis.extension.stage import AskedSwitches, Propose
     from dynident.effect_modules import Permission
     from dynident.effects import Law
     from dynident.evidence import Comparison

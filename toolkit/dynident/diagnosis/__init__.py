@@ -7,7 +7,8 @@ that would distinguish each from those that explain the same, every candidate, a
 
 The way of data is `compare -> rank -> add -> refit -> judge`; `procedure` is those five steps.
 
-- `search`: ranks effects and chooses among them. `nuisances`: what is allowed for. `advice`: which
+- `extension`: the model, effect after effect, the straight way or another. `search`: ranks effects
+  and chooses among them. `nuisances`: what is allowed for. `advice`: which
   experiment would show what this data does not.
 - `dependence`: what a residual that no effect explains depends on.
 - `verdict`: when a model is said to be complete. `track_record`: how often that was right.

@@ -23,10 +23,8 @@ it is called, that is the answer, and nothing is added.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-
-import numpy as np
 
 from dynident.arguments import checked
 from dynident.closed_loop import Controller
@@ -36,40 +34,31 @@ from dynident.diagnosis.advice.geometry_doubt import with_geometry_doubt
 from dynident.diagnosis.assembly import Search, assemble
 from dynident.diagnosis.dependence.what_is_left import doubted, with_dependence
 from dynident.diagnosis.details import Withdrawn
+from dynident.diagnosis.extension.extending import extend, rank_stage
+from dynident.diagnosis.extension.other_ways import by_other_ways
+from dynident.diagnosis.extension.stage import AskedSwitches, DiagnosisTask, Propose, Stage
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
-from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
-from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
 from dynident.diagnosis.nuisances.sticking import seen_alike, without_sticking
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
-from dynident.diagnosis.reversals import as_much, left_out, without_their_reversals
-from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.path import Path, path_of, responses_in_place
 from dynident.diagnosis.search.payload_recordings import (
     marked,
-    with_payload,
     with_payload_decided,
 )
-from dynident.diagnosis.search.ranking import candidates, rank, unresolved
-from dynident.diagnosis.search.refusal import follows_the_filter, narrower, newly_impossible
+from dynident.diagnosis.search.ranking import candidates
+from dynident.diagnosis.search.refusal import narrower
 from dynident.diagnosis.search.selection import (
-    AddedEffect,
-    alternatives_only,
-    at_other_joints,
-    breaks_its_promise,
-    choose,
     without_superfluous,
 )
-from dynident.diagnosis.search.shaped_fit import refitted, shaped
-from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stage
+from dynident.diagnosis.search.shaped_fit import shaped
 from dynident.diagnosis.switches import switches_of
 from dynident.effects import Effect
 from dynident.errors import FitError
 from dynident.evidence.evidence import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_recordings
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
@@ -149,8 +138,8 @@ def diagnose(
         switches=switches,
     )
     start = _compare(given, controller, criteria, task)
-    extended = _extend(_rank(start, task), task)
-    settled, path = _settle(_search_globally(start, extended, task), task)
+    extended = extend(rank_stage(start, task), task)
+    settled, path = _settle(by_other_ways(start, extended, task), task)
     found = _judge(settled, path, task)
     if faults:
         return found.answered_by(faults)
@@ -204,121 +193,6 @@ def _variants(given: Model) -> tuple[Effect, ...]:
     return tuple(v for effect in candidates(given) for v in effect.variants(given.robot))
 
 
-def _rank(stage: Stage, task: DiagnosisTask) -> Stage:
-    """Rank every effect that the model lacks; drop alternatives that are significant beside it."""
-    ranking = rank(stage.evidence, stage.fitted, len(stage.found), task.progress)
-    ranking = ranking.refusing(stage.refused)
-    found = tuple(
-        alternatives_only(one, ranking) if one in stage.latest else one for one in stage.found
-    )
-    return replace(stage, found=found, rounds=(*stage.rounds, ranking))
-
-
-def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
-    """Add the best effect, refit, and rank again, until none passes every gate."""
-    while stage.proposals < task.most:
-        if why := _resolved(stage, task):
-            every = [one.effect.label for one in stage.rounds[-1].passing]
-            return _refusing(stage, dict.fromkeys(every, why))
-        best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
-        if best is None:
-            laws = laws_of_the_rest(stage.evidence, stage.fitted)
-            doubtful = without_their_reversals(stage, laws, "")
-            if doubtful is stage:
-                break
-            stage = _rank(doubtful, task)
-            continue
-        label, many = best.score.effect.label, len(stage.found)
-        laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score, many)
-        doubtful = without_their_reversals(stage, laws, label)
-        if doubtful is not stage:
-            stage = _rank(doubtful, task)
-            continue
-        if laws:
-            why = as_much(laws, label)
-            earlier = (one for one in stage.notes if not one.startswith(f"{label} "))
-            noted = replace(stage, notes=(*earlier, f"{why}."))
-            stage = _refusing(noted, {label: why})
-            continue
-        wider, why = _tried(stage, best, task)
-        stage = _refusing(stage, {label: why}) if why else _rank(wider, task)
-    return stage
-
-
-def _refusing(stage: Stage, reasons: Mapping[str, str]) -> Stage:
-    """Return a stage whose latest ranking refuses effects, by their labels."""
-    ranking = stage.rounds[-1].refusing(reasons)
-    return replace(stage, rounds=(*stage.rounds[:-1], ranking))
-
-
-def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
-    """Return the model with one effect more, and why it is refused; that is empty if it is not."""
-    added = _add_and_refit(stage, best, task)
-    if why := breaks_its_promise(stage.fitted, added.fitted, best.score):
-        return added, why
-    wider = _seen_anew(stage, added)
-    why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-    why = why or unresolved(wider.evidence, wider.fitted, best.score.effect.label)
-    effect = best.score.effect
-    narrow = seen_alike(stage.narrow, wider.evidence, stage.doubtful, effect.joint)
-    why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, effect)
-    return wider, why
-
-
-def _add_and_refit(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> Stage:
-    """Return the model with one effect more, all of it fitted anew."""
-    task.progress(f"adding {best.score.effect.label}")
-    evidence, before, start = with_payload(stage.evidence, best.score), stage.fitted, stage.start
-    if evidence is not stage.evidence:
-        start = fit_evidence(evidence, start.model, start)
-    others = at_other_joints(evidence, before, best, len(stage.found))
-    others = tuple(one for one in others if one.score.effect.label not in stage.refused)
-    added = (best, *others)
-    model = before.model + tuple(one.score.effect for one in added)
-    fitted = with_friction_width(evidence, refitted(evidence, model, before))
-    found = (*stage.found, *added)
-    return replace(stage, evidence=evidence, start=start, fitted=fitted, found=found)
-
-
-def _seen_anew(stage: Stage, added: Stage) -> Stage:
-    """Return a model with the evidence that it calls for: columns, a simulated loop, reversals."""
-    evidence, fitted = added.evidence, added.fitted
-    if _has_changed(evidence, stage.start, fitted):
-        evidence = evidence.looked_at_anew()
-    loop, moved = stage.loop.renewed(evidence, fitted)
-    if moved is not evidence:
-        evidence = moved
-        fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
-    whole, start = evidence, added.start
-    evidence, held = without_sticking(evidence, added.held, fitted)
-    if evidence is not whole:
-        start = fit_evidence(evidence, start.model, start)
-        fitted = fit_evidence(evidence, fitted.model, fitted)
-    return replace(added, evidence=evidence, held=held, loop=loop, start=start, fitted=fitted)
-
-
-def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
-    """Look through all shapes where a residual remains, and extend again with what was missed."""
-    if not task.most or (start.loop.runs and extended.fitted.noise_known):
-        return extended
-    first = replace(start, rounds=extended.rounds[:1])
-    if start.loop.runs:
-        first = extended  # simulated motions are renewed as the model grows: there is no way back
-    elif extended.doubtful:  # both branches are to be judged on the same rows
-        start = left_out(start, extended.doubtful)
-        first = _rank(replace(start, rounds=()), task)
-    missed = global_search(first.ranked, extended.ranked, task.progress)
-    if missed is None:
-        return extended
-    base = extended
-    if missed.fitted is not extended.fitted:
-        # What was kept of the first ranking belongs to the other branch.
-        base = replace(first, evidence=start.evidence.looked_at_anew())
-    other = _extend(replace(base, rounds=(*base.rounds[:-1], missed.ranking)), task)
-    better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
-    return other if better and set(other.doubtful) == set(extended.doubtful) else extended
-
-
 def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     """Drop what is superfluous and withdraw what does harm; then go on with what is left.
 
@@ -335,8 +209,8 @@ def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
             refused = dict(stage.refused)
             for one in path.withdrawn:
                 refused |= one.refusals
-            stage = _rank(replace(stage, refused=refused), task)
-        wider = _extend(stage, task) if path.withdrawn and looks <= most else stage
+            stage = rank_stage(replace(stage, refused=refused), task)
+        wider = extend(stage, task) if path.withdrawn and looks <= most else stage
         if wider.found == stage.found:
             return wider, replace(path, withdrawn=withdrawn, looks=looks)
         stage = wider
@@ -420,20 +294,3 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
 def _decided(stage: Stage) -> Evidence | None:
     """The test recordings, with those marked that carry a payload of the model."""
     return None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
-
-
-def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:
-    """Whether effects have changed the predicted torque enough to look at candidates again."""
-    before, now = (on_recordings(evidence, one) for one in (start, fitted))
-    return now.error < before.error - evidence.criteria.search.another_model
-
-
-def _resolved(stage: Stage, task: DiagnosisTask) -> str:
-    """Why nothing is sought in what is left; empty where it may be missing physics."""
-    judged = on_recordings(stage.evidence, stage.fitted)
-    least = stage.evidence.criteria.verdict.resolution
-    if np.all(judged.residual_rms <= least * judged.torque_rms):
-        return "all that is left is less than the processing resolves"
-    if nothing_but_rounding(judged, stage.fitted, task.train):
-        return "all that is left may be the steps of the encoders"
-    return ""

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynident.diagnosis.extension.stage import Stage
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.reversal_laws import ReversalLaw
 from dynident.diagnosis.nuisances.sticking import every_row_is_asked_for, without_reversals
-from dynident.diagnosis.stage import Stage
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 
