@@ -7,7 +7,7 @@ import pytest
 
 from dynident.criteria import DEFAULTS
 from dynident.effects import Block
-from dynident.model import Model, impossible_at, impossible_joints
+from dynident.model import Model, beyond_bounds, impossible_joints
 from dynident.model.possible_values import ImpossibleJoint
 from synthetic import arm, smooth_motion, true_values
 
@@ -25,8 +25,12 @@ def found(model: Model, changes: dict[str, float], sigma: float = 1e-3) -> list[
     values = true_values(model, **FRICTION)
     for name, value in changes.items():
         values[model.names.index(name)] = value
-    covariance = sigma**2 * np.eye(model.size)
-    return [one.where for one in impossible_at(model, values, covariance, states(model), GATES)]
+    covariance, each = sigma**2 * np.eye(model.size), np.full(model.size, sigma)
+    every = (
+        *beyond_bounds(model, values, each, GATES),
+        *impossible_joints(model, values, covariance, states(model), GATES),
+    )
+    return [one.where for one in every]
 
 
 def joints(values: np.ndarray, sigma: float = 1e-3) -> tuple[ImpossibleJoint, ...]:

@@ -8,6 +8,7 @@ from functools import cached_property, reduce
 from operator import add
 
 import numpy as np
+from scipy.linalg import null_space
 
 from dynident.criteria import Criteria
 from dynident.evidence.columns.joint_columns import JointColumns, WhiteColumns
@@ -21,10 +22,20 @@ from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import MomentSolution, regress, regression_values
+from dynident.moments.solution import (
+    MomentSolution,
+    orthonormal,
+    orthonormal_directions,
+    regress,
+    regression_values,
+)
 
 _LEAST = 1e-13
 """Noise over the largest joint's torque: one without torque would be fitted ever more closely."""
+
+_FIRM = 1e3  # how much firmer a body's description is than that an effect is zero
+_ALONE = 1e-6
+"""Square of a parameter's direction, of length 1, that what the data tell may leave out."""
 
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each stack of runs, of each joint."""
@@ -87,6 +98,13 @@ class EvidenceFit:
         return self.moments.pooled()
 
     @cached_property
+    def alone(self) -> np.ndarray:
+        """Parameters that the data tell on their own, not only together with others, (p,) bool."""
+        scale = np.sqrt(np.diag(self.pooled.gram))
+        told = orthonormal(scale[:, None] * self.solution.basis)
+        return np.sum(told**2, axis=1) > 1.0 - _ALONE
+
+    @cached_property
     def without_each_block(self) -> np.ndarray:
         """Values of the fit to all blocks but one, for each, (B, p)."""
         least = self.criteria.noise.reliable
@@ -137,7 +155,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values, white)
-        values = regression_values(_pooled(evidence, model, noise, white), reliable)
+        pooled = _pooled(evidence, model, noise, white)
+        values = _near_description(model, regression_values(pooled, reliable), pooled)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -155,7 +174,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     white = _whiten(evidence, columns, noise, values, white)
     summed = _moments(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)
-    values = solution.values
+    values = _near_description(model, solution.values, summed.pooled())
     left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
         criteria=evidence.criteria,
@@ -260,6 +279,24 @@ def _held(model: Model, values: np.ndarray) -> np.ndarray:
         if effect.point and effect.is_dynamic_response:
             held[model.slices[effect.label]] = effect.point
     return held
+
+
+def _near_description(model: Model, values: np.ndarray, moments: SecondMoments) -> np.ndarray:
+    """Values (p,), with what the data leave open as near to the description as it can be.
+
+    Where a mass is told only together with a rotor, half of both would be the least values: a base
+    that is tilted feels the mass alone. Bodies are described, and effects take the rest.
+    """
+    if not model.needs_values:
+        return values
+    scale = np.sqrt(np.diag(moments.gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    told = orthonormal(scale[:, None] * orthonormal_directions(moments.gram, scale))
+    left_open = null_space(told.T)
+    firm = np.ones(model.size)
+    firm[: len(model.base.independent)] = _FIRM
+    off = firm * scale * (model.given_values() - values)
+    return values + left_open @ np.linalg.lstsq(firm[:, None] * left_open, off)[0] / scale
 
 
 def _keeping_dependent(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:

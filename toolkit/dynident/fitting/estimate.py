@@ -27,6 +27,7 @@ _MUCH_LEFT = 0.2
 _INDEPENDENT = "sigma takes the errors of the equations as independent"
 """How the words of such a sigma begin, in files, too."""
 
+_SHARED = 1e-9  # coefficient of a combination that is more than rounding
 _LISTED = 6  # names in a sentence
 
 
@@ -124,6 +125,13 @@ class Estimate(Shown):
         found = np.zeros(self.model.size, dtype=bool)
         found[list(self.basis.independent)] = True
         return found & ~np.isin(self.names, self.trading_off)
+
+    @property
+    def alone(self) -> np.ndarray:
+        """Which parameters are identified on their own, not only with others, (p,) bool."""
+        shared = np.zeros(self.model.size, dtype=bool)
+        shared[list(self.basis.independent)] = np.any(np.abs(self.basis.K) > _SHARED, axis=1)
+        return self.identified & ~shared
 
     @property
     def identified_values(self) -> np.ndarray:

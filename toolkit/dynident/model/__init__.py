@@ -11,16 +11,16 @@ torque; and of a whole recording once. Whether values are possible together say
 
 from dynident.model.friction_levels import coulomb_levels, dry_joints, levels_not_met, not_met
 from dynident.model.inertia_matrices import InertiaMatrices
-from dynident.model.possible_values import Impossible, impossible_at, impossible_joints
+from dynident.model.possible_values import Impossible, beyond_bounds, impossible_joints
 from dynident.model.torque_model import Model
 
 __all__ = [
     "Impossible",
     "InertiaMatrices",
     "Model",
+    "beyond_bounds",
     "coulomb_levels",
     "dry_joints",
-    "impossible_at",
     "impossible_joints",
     "levels_not_met",
     "not_met",

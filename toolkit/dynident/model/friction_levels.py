@@ -52,7 +52,7 @@ def levels_not_met(
 
     Parameters
     ----------
-    model, values, covariance, criteria : as in `impossible_at`.
+    model, values, covariance, criteria : as in `impossible_joints`.
     peaks : (n,) largest torque that was measured at each joint and that its bodies make, N m or N:
         friction balances no more than both.
 

@@ -59,30 +59,34 @@ class ImpossibleJoint(Impossible):
     torque: float
 
 
-def impossible_at(
-    model: Model,
-    values: np.ndarray,
-    covariance: np.ndarray,
-    states: Block,
-    criteria: GateCriteria,
-) -> tuple[Impossible, ...]:
-    """Return what the values of a model make that no robot can have.
+def beyond_bounds(
+    model: Model, values: np.ndarray, sigma: np.ndarray, criteria: GateCriteria
+) -> Iterator[Impossible]:
+    """Yield the parameters of effects that are beyond their bounds.
 
     Parameters
     ----------
     model : a robot with its effects.
-    values, covariance : (p,) and (p, p) of its parameters.
-    states : (T,) recorded ones, as of `Model.block`.
-    criteria : how many standard deviations are beyond doubt, and when a joint moves.
-
-    Returns
-    -------
-    Parameters beyond their bounds, and what `impossible_joints` finds.
+    values : (p,) of its parameters.
+    sigma : (p,) of them; zero where the data tell a parameter only together with others: what of
+        the sum is its own is a choice.
+    criteria : how many standard deviations are beyond doubt.
     """
-    return (
-        *_beyond_bounds(model, values, covariance, criteria.beyond_bounds),
-        *impossible_joints(model, values, covariance, states, criteria),
-    )
+    for effect in model.effects:
+        own = model.slices[effect.label]
+        parameters = effect.parameters(model.robot)
+        for parameter, value, s in zip(parameters, values[own], sigma[own], strict=True):
+            if not s > _ROUNDING * np.abs(values[own]).max(initial=0.0):
+                continue  # the data do not tell it: what it is, is rounding
+            slack = criteria.beyond_bounds * s
+            if value < parameter.lower - slack or value > parameter.upper + slack:
+                yield Impossible(
+                    where=f"{parameter.name} of {effect.label}",
+                    what=f"{parameter.name} = {number(value, 3)} {_unit(parameter)}"
+                    f"at {effect.joint or 'the robot'}",
+                    value=float(min(value - parameter.lower, parameter.upper - value)),
+                    std=float(s),
+                )
 
 
 def impossible_joints(
@@ -99,7 +103,10 @@ def impossible_joints(
 
     Parameters
     ----------
-    model, values, covariance, states, criteria : as in `impossible_at`.
+    model : a robot with its effects.
+    values, covariance : (p,) and (p, p) of its parameters.
+    states : (T,) recorded ones, as of `Model.block`.
+    criteria : how many standard deviations are beyond doubt, and when a joint moves.
 
     Returns
     -------
@@ -124,27 +131,6 @@ class _Fitted:
         std = np.sqrt(np.clip(variance, 0.0, None))
         told = std > _ROUNDING * np.abs(value)  # else it is rounding that the data do not tell
         return value, std, np.where(told, -value / np.where(told, std, 1.0), 0.0)
-
-
-def _beyond_bounds(
-    model: Model, values: np.ndarray, covariance: np.ndarray, deviations: float
-) -> Iterator[Impossible]:
-    sigma = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    for effect in model.effects:
-        own = model.slices[effect.label]
-        parameters = effect.parameters(model.robot)
-        for parameter, value, s in zip(parameters, values[own], sigma[own], strict=True):
-            if not s > _ROUNDING * np.abs(values[own]).max(initial=0.0):
-                continue  # the data do not tell it: what it is, is rounding
-            slack = deviations * s
-            if value < parameter.lower - slack or value > parameter.upper + slack:
-                yield Impossible(
-                    where=f"{parameter.name} of {effect.label}",
-                    what=f"{parameter.name} = {number(value, 3)} {_unit(parameter)}"
-                    f"at {effect.joint or 'the robot'}",
-                    value=float(min(value - parameter.lower, parameter.upper - value)),
-                    std=float(s),
-                )
 
 
 def _unit(parameter: Parameter) -> str:

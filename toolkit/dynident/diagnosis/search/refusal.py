@@ -22,7 +22,7 @@ from dynident.evidence.runs import gather
 from dynident.model import (
     Impossible,
     Model,
-    impossible_at,
+    beyond_bounds,
     impossible_joints,
     levels_not_met,
 )
@@ -62,8 +62,10 @@ def impossible_in(
     gates : from how many standard deviations something is impossible.
     """
     found = fitted.model, fitted.values, fitted.covariance
+    sigma = np.sqrt(np.clip(np.diag(fitted.covariance), 0.0, None))
     return (
-        *impossible_at(*found, recorded_states(evidence, fitted.model), gates),
+        *beyond_bounds(*found[:2], np.where(fitted.alone, sigma, 0.0), gates),
+        *impossible_joints(*found, recorded_states(evidence, fitted.model), gates),
         *levels_not_met(*found, friction_reach(evidence, fitted.values), gates),
     )
 

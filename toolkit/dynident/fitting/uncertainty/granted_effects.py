@@ -18,6 +18,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.tables import listed, number
 
+_NAMED = 4  # parameters in a sentence
 _MORE = 1.5
 """Standard deviations that a parameter would change by, or have, from which it is said."""
 
@@ -52,9 +53,26 @@ def with_granted_effects(estimate: Estimate, fit: Callable[[Model], Estimate]) -
                 f" It takes for granted that there is no {effect.title} ({effect.meaning}). Where "
                 f"that is not known, add {effect.label}: then {listed(parts)}."
             )
+    said += _bodies_left_open(estimate)
     if not said:
         return estimate
     return replace(estimate, sigma_words="".join([estimate.words_of_sigma, *said]))
+
+
+def _bodies_left_open(estimate: Estimate) -> list[str]:
+    """What effects whose columns are of bodies take of these from the description, a sentence."""
+    model, alone = estimate.model, estimate.alone
+    bodies = range(len(model.base.independent))
+    left = [model.names[i] for i in bodies if not alone[i]]
+    own = [one.title for one in model.effects if one.needs_bodies]
+    if not left or not own:
+        return []
+    more = f" and {len(left) - _NAMED} more" if left[_NAMED:] else ""
+    return [
+        f" The columns of {listed(own)} are made of the bodies. Of {', '.join(left[:_NAMED])}"
+        f"{more} the data tell only sums with other parameters: how much of a sum is a body's is "
+        "taken from the description, and sigma holds no error in that."
+    ]
 
 
 def _granted(model: Model) -> Iterator[Effect]:
