@@ -13,6 +13,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 from dynident import diagnose
 from dynident.criteria import DEFAULTS
+from dynident.diagnosis.nuisances import pulse_search
 from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.pulse_search import (
     DisturbancePulse,
@@ -23,7 +24,7 @@ from dynident.diagnosis.nuisances.pulse_search import (
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import Run, gather
-from dynident.recording import Dataset
+from dynident.recording import Dataset, Filter
 from study_files import true_model
 from synthetic import synthetic, true_values
 
@@ -277,3 +278,26 @@ def test_a_push_is_told_on_the_clock_of_its_recording() -> None:
     first, last = (float(x) for x in re.findall(r"t = (\S+) to (\S+) s", said)[0])
     assert "a push of 2 N m in run1," in said and "s, and 2 more pushes" in said
     assert (first, last) == pytest.approx((4.8, 5.2), abs=0.05), "two widths on either side"
+
+
+@pytest.mark.parametrize(("rate_hz", "cutoff_hz"), [(100.0, 8.0), (200.0, 5.0)])
+def test_what_a_filter_makes_up_at_the_ends_is_no_contact_though_a_study_keeps_it(
+    rate_hz: float, cutoff_hz: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A healthy arm used to be pushed at the last row of its recording."""
+    model = true_model()
+    for seed in range(3):
+        run = synthetic(
+            model, true_values(model), seed, rate_hz=rate_hz, torque_std=0.01, position_std=1e-6
+        )
+        keeps = Filter(position_cutoff_hz=cutoff_hz, ends="keep")
+        evidence = Evidence(model, gather(Dataset((run,), keeps)))
+        fitted = fit_evidence(evidence, model)
+        assert find_contacts(evidence, fitted) == ()
+        with monkeypatch.context() as as_before:
+            as_before.setattr(pulse_search, "_made_up", lambda one: np.zeros(len(one.t), bool))
+            assert all(
+                min(one.time, run.duration - one.time) < 0.5
+                for one in find_contacts(evidence, fitted)
+            )
+            assert find_contacts(evidence, fitted)

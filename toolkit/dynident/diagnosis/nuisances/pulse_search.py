@@ -27,6 +27,7 @@ from dynident.diagnosis.nuisances.changes import (
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
+from dynident.fitting.sampling import Sampled
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +73,7 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
         if run.kind != "repeated" or len(run.index) < 2:
             continue
         first, recording = run.replicates[0], run.recording
+        seen = ~np.any(_made_up(first)[run.index], axis=0)
         for j, joint in enumerate(recording.joints):
             if not run.certain(j).any() or _is_rounding(evidence, run, residual[:, :, j], j):
                 continue
@@ -83,10 +85,19 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
                     t=first.t[run.index] + recording.start,
                     residual=residual[:, :, j],
                     speed=first.v[:, j][run.index],
-                    certain=run.certain(j),
+                    certain=run.certain(j) & seen,
                 )
             )
     return pulses_in(found, evidence.criteria)
+
+
+def _made_up(sampled: Sampled) -> np.ndarray:
+    """Rows (T,) that filters make up beyond the ends of a recording, where a study keeps them."""
+    filter, rate = sampled.parallel.filter, sampled.recording.rate_hz
+    margins = np.array(replace(filter, ends="drop").margins(rate)) / rate
+    begin, end = margins + sampled.parallel.transient
+    t = sampled.recording.t
+    return (sampled.t < t[0] + begin) | (sampled.t > t[-1] - end)
 
 
 def _is_rounding(evidence: Evidence, run: Run, residual: np.ndarray, joint: int) -> bool:

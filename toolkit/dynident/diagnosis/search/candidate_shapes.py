@@ -68,6 +68,8 @@ def refined(
     """
     if not one.drop > 0:
         return one
+    if one.effect.point and one.effect.is_dynamic_response and not min(one.effect.point) > 0.0:
+        return one  # where a gap has closed, no shape of its two sides is seen
     objective, criteria = MomentObjective(evidence, fitted, one, columns_of), fitted.criteria.shapes
     if not one.effect.shape_parameters(fitted.model.robot):
         return _at_its_values(objective) if one.effect.nonlinear else one
