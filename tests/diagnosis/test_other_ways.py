@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import dynident as di
-from dynident.diagnosis import Diagnosis
-from dynident.diagnosis.extension import other_ways
+from dynident.diagnosis import Diagnosis, procedure
+from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values
 
@@ -29,12 +31,32 @@ def found(stiffness: float, preload: float, rotor: float) -> Diagnosis:
 @pytest.mark.slow
 @pytest.mark.parametrize(("stiffness", "preload", "rotor"), [(0.3, 0.3, 0.05), (0.2, 0.4, 0.05)])
 def test_a_spring_and_a_rotor_are_found_though_an_offset_comes_first(
-    stiffness: float, preload: float, rotor: float, monkeypatch: pytest.MonkeyPatch
+    stiffness: float, preload: float, rotor: float
 ) -> None:
     said = found(stiffness, preload, rotor)
     assert {step.effect.label for step in said.steps} == {SPRING, ROTOR}
     assert said.verdict == "explained"
-    monkeypatch.setattr(other_ways, "_WAYS", 0)
-    straight = found(stiffness, preload, rotor)
-    assert straight.verdict == "unexplained"
-    assert OFFSET in {step.effect.label for step in straight.steps}
+
+
+@pytest.mark.slow
+def test_two_are_found_where_neither_is_significant_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where few blocks of time tell it: here nothing is let pass in the first round."""
+
+    def nothing_passes(stage: Stage, task: DiagnosisTask) -> Stage:
+        (first,) = stage.rounds
+        every = dict.fromkeys((one.effect.label for one in first.scores), "not significant")
+        return replace(stage, rounds=(first.refusing(every),))
+
+    monkeypatch.setattr(procedure, "extend", nothing_passes)
+    said = found(0.3, 0.3, 0.05)
+    assert {step.effect.label for step in said.steps} == {SPRING, ROTOR}
+    assert said.verdict == "explained"
+    assert all(step.p_value < 1e-3 for step in said.steps)
+
+
+@pytest.mark.slow
+def test_the_straight_way_leaves_a_residual(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(procedure, "by_other_ways", lambda start, extended, task: extended)
+    said = found(0.2, 0.4, 0.05)
+    assert said.verdict == "unexplained"
+    assert OFFSET in {step.effect.label for step in said.steps}

@@ -45,7 +45,7 @@ def test_folds_any_further_dimensions():
 @pytest.mark.parametrize(
     ("samples", "rate", "period", "message"),
     [
-        (500, 50.0, 8.0, r"run: 10 s hold no two periods of 8 s. record longer"),
+        (500, 50.0, 8.0, r"run: 10 s that are used hold no two periods of 8 s. record longer"),
         (500, 50.0, 0.01, r"run: a period of 0.01 s is 0.5 samples at 50 Hz. is it given in s\?"),
         (500, 50.0, 3.333, r"run: .*166.65 samples at 50 Hz, no whole number. resample .*uniform"),
     ],

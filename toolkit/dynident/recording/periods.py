@@ -83,9 +83,10 @@ def periods(samples: int, rate_hz: float, period: float, where: str | None = Non
         count, length = full + 1, rest
     if count < 2:
         raise RecordingError(
-            f"{samples / rate_hz:.4g} s hold no two periods of {period:g} s",
+            f"{samples / rate_hz:.4g} s that are used hold no two periods of {period:g} s",
             where,
-            "record longer, or leave the period out",
+            "record longer, raise the cut-offs in [filter] (low ones take rows at the ends), or "
+            "leave the period out",
         )
     if abs(exact - whole) * (count - 1) > _DRIFT:
         raise RecordingError(

@@ -33,6 +33,7 @@ from dynident.wiring.gear_ratios import (
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
+_NO_MORE = 1.01  # of the torque that a mend leaves, over what is left without: rounding
 _LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _OF_SIZE = ("torque_scale", "motor_side")
 """Faults that say of which size a torque is already."""
@@ -319,4 +320,7 @@ def _wins(
     criteria: WiringCriteria,
 ) -> bool:
     gain = best[1].score - start.score
+    more = np.mean(best[1].unexplained) > _NO_MORE * np.mean(start.unexplained)
+    if best[0].kind == "torque_scale" and more:
+        return False  # one joint fits better, and all together worse: any scale that does may come
     return gain >= criteria.gain and gain * rows.independent >= criteria.evidence

@@ -8,12 +8,16 @@ from dynident.diagnosis.extension.extending import extend, rank_stage
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
+from dynident.diagnosis.search.payload_recordings import with_payload_decided
+from dynident.diagnosis.search.ranking import rank
+from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.verdict import within_noise
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 
 _MUCH_LESS = 0.5
 """Of what a model leaves, beyond the noise, that another must not leave to take its place."""
-_WAYS = 4  # that are gone at most, each from another effect that passes the first round
+_WAYS = 4  # that are gone at most, each from another effect of the first round
 
 
 def by_other_ways(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
@@ -25,7 +29,9 @@ def by_other_ways(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
     extended : with what the straight way has added.
     task : what is asked.
     """
-    return _by_another_beginning(start, _searched_globally(start, extended, task), task)
+    for way in (_searched_globally, _by_another_beginning, _by_two_at_once):
+        extended = way(start, extended, task)
+    return extended
 
 
 def _searched_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
@@ -57,8 +63,7 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
     tell. What is left beside it, and what else then explains that, does: a spring is first seen as
     the offset in it, and beside an offset its joint's rotor is not.
     """
-    known = extended.fitted.noise_known and not start.loop.runs
-    if not known or _is_enough(extended):
+    if not _leaves_a_residual(start, extended):
         return extended
     best, latest, refused = extended, extended, {}
     most = _MUCH_LESS * extended.fitted.misfit(start.start)
@@ -78,6 +83,66 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
             if _is_enough(best):
                 break
     return best
+
+
+def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
+    """Begin with what is not significant alone, and keep it if it is beside what comes next.
+
+    What one of two missing effects leaves is noise to the other: neither may be seen without it.
+    Both are there if nothing is left with them, of the test recordings neither, and each passes
+    every gate beside the other.
+    """
+    if not _leaves_a_residual(start, extended):
+        return extended
+    first = extended.rounds[0]
+    passing = {one.effect.label for one in first.passing}
+    alone = [one for one in first.scores if one.effect.label not in passing and one.drop > 0.0]
+    for one in [one for one in alone if not one.not_identifiable][:_WAYS]:
+        label = one.effect.label
+        task.progress(f"beginning with {label}, whatever its significance")
+        waits = f"asked again beside {label}"
+        refusals = ("" if other is one else waits for other in first.scores)
+        ranking = replace(first, refusals=tuple(refusals))
+        other = extend(replace(start, rounds=(ranking,)), task)
+        if not other.found or set(other.doubtful) != set(extended.doubtful):
+            continue
+        both = _with_first_judged(other, task)
+        if both.found and _is_enough(both) and _is_enough_for_others(both):
+            return both
+    return extended
+
+
+def _with_first_judged(stage: Stage, task: DiagnosisTask) -> Stage:
+    """Judge what was added first beside all that came after; without it if no gate lets it pass.
+
+    Parameters
+    ----------
+    stage : the model with all of them.
+    task : what is asked.
+    """
+    first, *others = stage.found
+    label = first.score.effect.label
+    effect = next(one for one in stage.fitted.model.effects if one.label == label)
+    rest = fit_evidence(stage.evidence, stage.fitted.model - effect, stage.fitted)
+    ranking = rank(stage.evidence, rest, len(others), only=(effect,))
+    if not ranking.passing:
+        return rank_stage(replace(stage, fitted=rest, found=tuple(others)), task)
+    (score,) = ranking.passing
+    judged = AddedEffect(score, ranking.corrected(score), ())
+    return replace(stage, found=(judged, *others))
+
+
+def _leaves_a_residual(start: Stage, extended: Stage) -> bool:
+    """Whether more than a known noise is left, and models can be compared from the start."""
+    return extended.fitted.noise_known and not start.loop.runs and not _is_enough(extended)
+
+
+def _is_enough_for_others(stage: Stage) -> bool:
+    """Whether nothing but noise is left of the test recordings, where there are any."""
+    if stage.held is None:
+        return True
+    held = with_payload_decided(stage.held, stage.fitted)
+    return within_noise(on_recordings(held, stage.fitted), stage.evidence.criteria.verdict)
 
 
 def _is_enough(stage: Stage) -> bool:

@@ -10,7 +10,7 @@ Analysis" (1998), section 2.1, with the correlation of consecutive rows accounte
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,9 +27,10 @@ from dynident.recording import (
     as_points,
     periods,
     require_repetition,
+    resolution,
     turning_round,
 )
-from dynident.tables import number
+from dynident.tables import listed, number
 
 _REJECTED = 4.0
 """Standard deviations under the noise alone above which a joint's residual is systematic. Measured:
@@ -47,6 +48,7 @@ class LackOfFit:
     systematic : (n,) root mean square of what repetitions have in common, N m or N.
     noise : (n,) standard deviation of what they have not.
     excess : (n,) mean square of the former in standard deviations under the noise alone.
+    stepped : joints whose encoders are seen to have steps, where the model is rejected.
     """
 
     joints: tuple[str, ...]
@@ -54,6 +56,7 @@ class LackOfFit:
     systematic: np.ndarray
     noise: np.ndarray
     excess: np.ndarray
+    stepped: tuple[str, ...] = ()
 
     @property
     def rejected(self) -> bool:
@@ -74,8 +77,18 @@ class LackOfFit:
         return (
             "The model is rejected by the repetitions of its motion: what they have in common in "
             f"the residual is no noise, {', '.join(parts)}. Parameters may be off by more than "
-            "sigma says. What is missing, or whether dry friction only reverses over another width "
-            "than is stated, `dynident explain` tells."
+            f"sigma says. {self._steps}What is missing, or whether dry friction only reverses over "
+            "another width than is stated, `dynident explain` tells."
+        )
+
+    @property
+    def _steps(self) -> str:
+        """That encoders' steps repeat with a motion; empty where no encoder has any."""
+        if not self.stepped:
+            return ""
+        return (
+            f"What the encoders' steps do repeats, too, at {listed(self.stepped)}: that it is no "
+            "more than they leave, `explain` would say. "
         )
 
 
@@ -103,13 +116,18 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     if not found:
         return None
     systematic, noise, spread, rows = (np.sum(one, axis=0) for one in zip(*found, strict=True))
-    return LackOfFit(
+    judged = LackOfFit(
         joints=model.robot.names,
         units=model.robot.torque_units,
         systematic=np.sqrt(np.maximum(systematic / rows, 0.0)),
         noise=np.sqrt(noise / rows),
         excess=systematic / np.sqrt(np.maximum(spread, np.finfo(float).tiny)),
     )
+    if not judged.rejected:
+        return judged
+    steps = np.any([resolution(one.q) > 0 for one in dataset.recordings], axis=0)
+    stepped = [joint for joint, one in zip(judged.joints, steps, strict=True) if one]
+    return replace(judged, stepped=tuple(stepped))
 
 
 def _of_recording(
