@@ -105,12 +105,15 @@ def test_where_reversals_are_left_out_no_model_is_called_right():
     one = replace(found, test_error=small, reversals_left_out={"elbow": 0.43})
     assert replace(one, reversals_left_out={}).track_record is not None
     assert one.track_record is None
-    assert one.sentence.startswith("Nothing is missing away from the reversals of elbow:")
+    assert one.sentence.startswith("Away from the reversals of elbow nothing is missing")
     assert "reversals of elbow (43 % of its rows)" in one.sentence
     head, (first, *_) = headline(one), next_steps(one)
     assert head.mark == "?" and "away from reversals" in head.title
     assert "Nothing is missing:" not in head.sentence + one.sentence
-    assert "do not trust the model of elbow" in first.what and "use the model" not in first.what
+    assert (
+        "Do not trust the model at the reversals of elbow" in first.what
+        and "use the model" not in first.what
+    )
 
 
 def test_what_is_added_is_said_with_what_these_data_do_not_tell_it_from():

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnosis import Diagnosis, procedure
+from dynident.diagnosis import Diagnosis
+from dynident.diagnosis.extension import extending
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.scoring import Score, impossible
@@ -81,7 +82,7 @@ def test_after_an_effect_that_breaks_its_promise_the_next_best_is_tried(monkeypa
     def broken(fitted, wider, one) -> str:
         return "keeps no promise" if one.effect.name == "quadratic_drag" else ""
 
-    monkeypatch.setattr(procedure, "breaks_its_promise", broken)
+    monkeypatch.setattr(extending, "breaks_its_promise", broken)
     true = FULL + "quadratic_drag@shoulder" + "torque_offset@elbow"
     found = diagnosed(true, Fq__shoulder=0.8, offset__elbow=0.4)
     assert "torque_offset@elbow" in [one.effect.label for one in found.steps]

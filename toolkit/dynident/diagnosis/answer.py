@@ -296,7 +296,7 @@ class Answer:
         if self.only_reversals_left:
             where = listed(list(self.reversals_left_out))
             return (
-                f"Nothing is missing away from the reversals of {where}: what remains there is "
+                f"Away from the reversals of {where} nothing is missing, and what remains is "
                 "within the noise."
             )
         return _VERDICTS[self.verdict].format(effects=effects)

@@ -100,8 +100,7 @@ class EvidenceFit:
     @cached_property
     def alone(self) -> np.ndarray:
         """Parameters that the data tell on their own, not only together with others, (p,) bool."""
-        scale = np.sqrt(np.diag(self.pooled.gram))
-        told = orthonormal(scale[:, None] * self.solution.basis)
+        told, _ = _told_directions(self.pooled)
         return np.sum(told**2, axis=1) > 1.0 - _ALONE
 
     @cached_property
@@ -156,7 +155,9 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             ]
         white = _whiten(evidence, columns, noise, values, white)
         pooled = _pooled(evidence, model, noise, white)
-        values = _near_description(model, regression_values(pooled, reliable), pooled)
+        values = regression_values(pooled, reliable)
+        if model.needs_values:
+            values = _near_description(model, values, pooled)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -244,15 +245,16 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) ->
     white = _whiten(evidence, columns, other.noise, fitted.values, fitted.white)
     summed = _moments(evidence, model, other.noise, white)
     solution = regress(summed.pooled(), reliable)
+    values = _near_description(model, solution.values, summed.pooled())
     return replace(
         fitted,
-        values=solution.values,
+        values=values,
         covariance=solution.covariance,
         solution=solution,
         noise=other.noise,
         white=white,
         moments=summed,
-        error_signal=_signal(evidence, white, solution.values),
+        error_signal=_signal(evidence, white, values),
     )
 
 
@@ -287,16 +289,23 @@ def _near_description(model: Model, values: np.ndarray, moments: SecondMoments) 
     Where a mass is told only together with a rotor, half of both would be the least values: a base
     that is tilted feels the mass alone. Bodies are described, and effects take the rest.
     """
-    if not model.needs_values:
-        return values
-    scale = np.sqrt(np.diag(moments.gram))
-    scale = np.where(scale > 0, scale, 1.0)
-    told = orthonormal(scale[:, None] * orthonormal_directions(moments.gram, scale))
+    told, scale = _told_directions(moments)
     left_open = null_space(told.T)
     firm = np.ones(model.size)
     firm[: len(model.base.independent)] = _FIRM
     off = firm * scale * (model.given_values() - values)
     return values + left_open @ np.linalg.lstsq(firm[:, None] * left_open, off)[0] / scale
+
+
+def _told_directions(moments: SecondMoments) -> tuple[np.ndarray, np.ndarray]:
+    """Directions that the columns show, (p, r) orthonormal, and the columns' norms (p,).
+
+    Of scaled parameters: each times the norm of its column.
+    """
+    scale = np.sqrt(np.diag(moments.gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    directions = orthonormal_directions(moments.gram, scale)
+    return orthonormal(scale[:, None] * directions), scale
 
 
 def _keeping_dependent(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:

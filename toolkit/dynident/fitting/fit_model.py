@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Protocol
@@ -111,8 +112,11 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
         said = (estimate.headline, judged.headline if judged is not None else "")
         estimate = replace(estimate, headline=" ".join(filter(None, said)))
-    elif not estimate.headline:
-        estimate = with_unsuited_width(estimate, dataset, method)
+    else:
+        with suppress(FitError):  # of a wider model than was asked for
+            estimate = with_granted_effects(estimate, lambda one: method.fit(one, dataset))
+        if not estimate.headline:
+            estimate = with_unsuited_width(estimate, dataset, method)
     notes = (
         standing_note(counted),
         too_wide_note(model, counted),
@@ -123,12 +127,10 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
 
 
 def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:
-    again = (lambda one: method.fit(one, dataset)) if isinstance(method, LeastSquares) else None
     if not shaped_effects(model):
-        estimate = method.fit(model, dataset)
-    else:
-        shaped = refine_shapes(model, dataset)
-        estimate = method.fit(shaped.model, dataset)
-        estimate = replace(estimate, status=f"{estimate.status}, {shaped.status}")
-        estimate = with_shape_errors(estimate, again)
-    return with_granted_effects(estimate, again) if again else estimate
+        return method.fit(model, dataset)
+    shaped = refine_shapes(model, dataset)
+    estimate = method.fit(shaped.model, dataset)
+    estimate = replace(estimate, status=f"{estimate.status}, {shaped.status}")
+    again = isinstance(method, LeastSquares)
+    return with_shape_errors(estimate, (lambda one: method.fit(one, dataset)) if again else None)

@@ -176,7 +176,7 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
             said = f"Held-out data confirm nothing that is missing, and what remains is {rest}."
             return Headline("?", "no missing effect is confirmed", said)
         if diagnosis.only_reversals_left:
-            said = f"Nothing is missing away from reversals: what remains there is {rest}."
+            said = f"Away from reversals nothing is missing, and what remains is {rest}."
             return Headline("?", "nothing is missing away from reversals", said)
         said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)

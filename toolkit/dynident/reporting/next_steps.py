@@ -87,8 +87,8 @@ def _all_is_well(diagnosis: Diagnosis) -> Advice:
     if diagnosis.reversals_left_out:
         where = listed(list(diagnosis.reversals_left_out))
         what = (
-            f"Nothing of the catalogue is to be added.{widths} Where it reverses, do not trust the "
-            f"model of {where}: record reversals at several accelerations, which tell one law of "
+            f"Nothing of the catalogue is to be added.{widths} Do not trust the model at the "
+            f"reversals of {where}: record them at several accelerations, which tell one law of "
             "dry friction from another."
         )
         return Advice(what, "Away from them what is left of the torque is noise.")
@@ -326,8 +326,8 @@ def _to_try(diagnosis: Diagnosis) -> tuple[list[Advice], list[Advice]]:
             besides.append(Advice(f"{what}.", why, (command,)))
             continue
         what = (
-            f"Do not add {listed(list(one.instead_of))} yet. {what}: with it alone the error falls "
-            f"from {percent(one.test_error_before)} to {percent(one.test_error_after)}."
+            f"Do not add {listed(list(one.instead_of))} yet. {what}: with it instead the error "
+            f"falls from {percent(one.test_error_before)} to {percent(one.test_error_after)}."
         )
         instead.append(Advice(what, why, (command,)))
     return instead, besides

@@ -9,8 +9,7 @@ from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import with_payload_decided
-from dynident.diagnosis.search.ranking import rank
-from dynident.diagnosis.search.selection import AddedEffect
+from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
@@ -76,60 +75,62 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
         if not ranking.passing:
             break
         task.progress(f"going another way than by {begun}")
-        latest = extend(replace(start, rounds=(ranking,)), task)
+        latest = extend(_from(start, ranking), task)
         left = latest.fitted.misfit(start.start)
         if left < most and set(latest.doubtful) == set(extended.doubtful):
             best, most = latest, left
             if _is_enough(best):
                 break
-    return best
+    return _with_first_round(best, extended)
 
 
 def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
-    """Begin with what is not significant alone, and keep it if it is beside what comes next.
+    """Begin with what is not significant alone, and see whether it is beside what comes next.
 
     What one of two missing effects leaves is noise to the other: neither may be seen without it.
-    Both are there if nothing is left with them, of the test recordings neither, and each passes
-    every gate beside the other.
+    What came first is taken out again, and the model extended the straight way from what came after
+    it. That counts if nothing is left then, of the test recordings neither.
     """
     if not _leaves_a_residual(start, extended):
         return extended
     first = extended.rounds[0]
     passing = {one.effect.label for one in first.passing}
     alone = [one for one in first.scores if one.effect.label not in passing and one.drop > 0.0]
-    for one in [one for one in alone if not one.not_identifiable][:_WAYS]:
+    begun = [one for one in alone if not one.not_identifiable][:_WAYS]
+    for tried, one in enumerate(begun, 1):
         label = one.effect.label
         task.progress(f"beginning with {label}, whatever its significance")
         waits = f"asked again beside {label}"
         refusals = ("" if other is one else waits for other in first.scores)
-        ranking = replace(first, refusals=tuple(refusals))
-        other = extend(replace(start, rounds=(ranking,)), task)
-        if not other.found or set(other.doubtful) != set(extended.doubtful):
+        other = extend(_from(start, replace(first, refusals=tuple(refusals))), task)
+        if len(other.found) < 2 or set(other.doubtful) != set(extended.doubtful):
             continue
-        both = _with_first_judged(other, task)
-        if both.found and _is_enough(both) and _is_enough_for_others(both):
-            return both
+        both = _without_its_first(other, task)
+        if _is_enough(both) and _is_enough_for_others(both):
+            # As many beginnings are as many searches.
+            found = (replace(f, p_value=min(1.0, tried * f.p_value)) for f in both.found)
+            return _with_first_round(replace(both, found=tuple(found)), extended)
     return extended
 
 
-def _with_first_judged(stage: Stage, task: DiagnosisTask) -> Stage:
-    """Judge what was added first beside all that came after; without it if no gate lets it pass.
+def _from(start: Stage, ranking: Ranking) -> Stage:
+    """The model as given with another first round; columns of other ways belong to their models."""
+    return replace(start, evidence=start.evidence.looked_at_anew(), rounds=(ranking,))
 
-    Parameters
-    ----------
-    stage : the model with all of them.
-    task : what is asked.
-    """
+
+def _with_first_round(stage: Stage, extended: Stage) -> Stage:
+    """A stage with the first round as it was: what was refused for another way was not, there."""
+    return replace(stage, rounds=(extended.rounds[0], *stage.rounds[1:]))
+
+
+def _without_its_first(stage: Stage, task: DiagnosisTask) -> Stage:
+    """Take out what was added first, and extend the model from what came after it."""
     first, *others = stage.found
     label = first.score.effect.label
     effect = next(one for one in stage.fitted.model.effects if one.label == label)
     rest = fit_evidence(stage.evidence, stage.fitted.model - effect, stage.fitted)
-    ranking = rank(stage.evidence, rest, len(others), only=(effect,))
-    if not ranking.passing:
-        return rank_stage(replace(stage, fitted=rest, found=tuple(others)), task)
-    (score,) = ranking.passing
-    judged = AddedEffect(score, ranking.corrected(score), ())
-    return replace(stage, found=(judged, *others))
+    without = replace(stage, fitted=rest, found=tuple(others), refused={})
+    return extend(rank_stage(without, task), task)
 
 
 def _leaves_a_residual(start: Stage, extended: Stage) -> bool:

@@ -1,4 +1,4 @@
-"""Whether dry friction reverses over another speed than the friction width that is stated.
+"""Whether dry friction reverses over another speed than the model's friction width.
 
 Nothing looks wrong then in a residual: its rows around reversals are few. But friction that is made
 to reverse too slowly is made up for at speed, and Coulomb and viscous friction are off by many of
@@ -7,16 +7,17 @@ their standard deviations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.errors import FitError
+from dynident.errors import FitError, RecordingError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
-from dynident.fitting.uncertainty.shape_slopes import width_slope
-from dynident.model import coulomb_levels, dry_joints
+from dynident.fitting.uncertainty.shape_slopes import WidthSecant, WidthSlope, width_slope
+from dynident.model import Model, coulomb_levels, dry_joints
 from dynident.recording import Dataset
 from dynident.tables import listed, number
 
@@ -35,7 +36,7 @@ class _Unsuited:
     ----------
     joint : its name.
     width : with its unit.
-    change : of the logarithm of the width, in the first step towards a better one, in its sigma.
+    change : towards a wider or a narrower one, in its sigma.
     """
 
     joint: str
@@ -54,9 +55,9 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
 
     The derivative of a joint's torque by the logarithm of its width is a column more; its
     coefficient is the first step of Gauss and Newton towards the best width (Seber and Wild,
-    *Nonlinear Regression*, 2003, section 2.1). That a width does not suit is said where the
-    coefficient stands 4 standard errors from zero and Coulomb friction changes with it by 2 of its
-    own.
+    *Nonlinear Regression*, 2003, section 2.1). Another is the secant to ten times the width. That a
+    width does not suit is said where either coefficient stands 4 standard errors from zero and
+    Coulomb friction changes with it by 2 of its own.
 
     Parameters
     ----------
@@ -64,45 +65,59 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
     dataset : what was fitted; of a long one the first part is looked at.
     method : that it was fitted with.
     """
-    model, robot = estimate.model, estimate.model.robot
+    model = estimate.model
     slopes = [width_slope(model, estimate.values, one) for one in dry_joints(model)]
-    added = tuple(one for one in slopes if one is not None)
+    slopes = [one for one in slopes if one is not None]
+    secants = [WidthSecant(one.joint, of=one.of, values=one.values) for one in slopes]
     keeps = dataset.filter is not None and dataset.filter.ends == "keep"
-    if not added or keeps or method.errors == "independent":
+    if not slopes or keeps or method.errors == "independent":
         return estimate
     found, some = [], _beginning(dataset)
-    with suppress(FitError):  # the first part may be too short for the model
+    with suppress(FitError, RecordingError):  # of the first part alone, which may be too short
         given = estimate if some is dataset else method.fit(model, some)
-        wide = method.fit(replace(model, effects=(*model.effects, *added)), some)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            change = wide.values / wide.sigma
-            off = (wide.values[: model.size] - given.values) / given.sigma
-        levels = coulomb_levels(model, off)
-        for slope in added:
-            at = wide.model.slices[slope.label].start
-            j = robot.names.index(str(slope.joint))
-            if abs(change[at]) > _CLEARLY and abs(levels[j]) > _MATTERS:
-                width = f"{number(float(model.friction_widths[j]), 2)} {robot.units[j]}/s"
-                found.append(_Unsuited(str(slope.joint), width, float(change[at])))
+        # One after the other: together each would take a part of what the other shows.
+        for columns in (slopes, secants):
+            found = found or _unsuited(given, method.fit(_wider(model, columns), some), columns)
     if not found:
         return estimate
     headline = (
-        "Dry friction does not reverse over the friction width that is stated, or what the model "
-        f"lacks looks like that: the width seems {listed([one.words for one in found])}. "
-        "Coulomb and viscous friction are then off by more than sigma says. `dynident explain` "
-        "tells which it is, and the width to write."
+        "Dry friction does not reverse over the model's friction width, or what the model lacks "
+        f"looks like that: the width seems {listed([one.words for one in found])}. Coulomb "
+        "friction is then off by more than sigma says. `dynident explain` looks into which it is, "
+        "and which width to write."
     )
     return replace(estimate, headline=headline)
 
 
+def _wider(model: Model, columns: Sequence[WidthSlope]) -> Model:
+    return replace(model, effects=(*model.effects, *columns))
+
+
+def _unsuited(given: Estimate, wide: Estimate, columns: Sequence[WidthSlope]) -> list[_Unsuited]:
+    """Joints whose width does not suit, by a fit with columns more."""
+    model, robot, found = given.model, given.model.robot, []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = wide.values / wide.sigma
+        off = (wide.values[: model.size] - given.values) / given.sigma
+    levels = coulomb_levels(model, off)
+    for one in columns:
+        joint, z = str(one.joint), float(change[wide.model.slices[one.label].start])
+        j = robot.names.index(joint)
+        if abs(z) > _CLEARLY and abs(levels[j]) > _MATTERS:
+            width = f"{number(float(model.friction_widths[j]), 2)} {robot.units[j]}/s"
+            found.append(_Unsuited(joint, width, z))
+    return found
+
+
 def _beginning(dataset: Dataset) -> Dataset:
-    """The first recordings of a dataset, or part of one, that have samples enough."""
+    """The first recordings of a dataset, the last of them in part, that have samples enough."""
+    if sum(one.samples for one in dataset.recordings) <= _ENOUGH:
+        return dataset
     some, left = [], _ENOUGH
     for recording in dataset.recordings:
-        if recording.samples > left:
-            if not some:
-                some.append(recording.part(slice(0, left)))
-            return replace(dataset, recordings=tuple(some))
-        some.append(recording)
-        left -= recording.samples
-    return dataset
+        within = recording if recording.window is None else recording.cut(*recording.window)
+        some.append(within.part(slice(0, left)) if within.samples > left else within)
+        left -= some[-1].samples
+        if left < 2:
+            break
+    return replace(dataset, recordings=tuple(some))

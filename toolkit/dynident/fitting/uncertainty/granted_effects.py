@@ -63,7 +63,7 @@ def _bodies_left_open(estimate: Estimate) -> list[str]:
     """What effects whose columns are of bodies take of these from the description, a sentence."""
     model, alone = estimate.model, estimate.alone
     bodies = range(len(model.base.independent))
-    left = [model.names[i] for i in bodies if not alone[i]]
+    left = [model.names[i] for i in bodies if estimate.identified[i] and not alone[i]]
     own = [one.title for one in model.effects if one.needs_bodies]
     if not left or not own:
         return []

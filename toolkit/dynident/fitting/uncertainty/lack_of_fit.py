@@ -35,6 +35,7 @@ from dynident.tables import listed, number
 _REJECTED = 4.0
 """Standard deviations under the noise alone above which a joint's residual is systematic. Measured:
 3.5 is the largest of 600 joints to which nothing was missing."""
+_LOOKED_AT = 20_000  # samples that show an encoder's steps
 _LAGS = 20  # rows up to which noise is correlated
 
 
@@ -87,8 +88,8 @@ class LackOfFit:
         if not self.stepped:
             return ""
         return (
-            f"What the encoders' steps do repeats, too, at {listed(self.stepped)}: that it is no "
-            "more than they leave, `explain` would say. "
+            f"The steps of the encoders at {listed(self.stepped)} repeat with the motion, too, and "
+            "may be a part of it. "
         )
 
 
@@ -125,7 +126,8 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     )
     if not judged.rejected:
         return judged
-    steps = np.any([resolution(one.q) > 0 for one in dataset.recordings], axis=0)
+    periodic = [one for one in dataset.recordings if one.period]
+    steps = np.any([resolution(one.q[:_LOOKED_AT]) > 0 for one in periodic], axis=0)
     stepped = [joint for joint, one in zip(judged.joints, steps, strict=True) if one]
     return replace(judged, stepped=tuple(stepped))
 

@@ -95,6 +95,8 @@ class WidthSlope(Effect):
     of: tuple[Effect, ...] = ()
     values: tuple[tuple[float, ...], ...] = ()
     name: ClassVar[str] = "friction width"
+    ends: ClassVar[tuple[float, float]] = (_STEP, -_STEP)
+    """Logarithms of two widths, over the model's, between which the torque changes."""
     in_catalogue: ClassVar[bool] = False
 
     @property
@@ -114,9 +116,8 @@ class WidthSlope(Effect):
         return (Parameter("width", "1"),)
 
     def columns(self, block: Block) -> np.ndarray:
-        steps = (_STEP, -_STEP)
-        wider, narrower = (self._torque(block, np.exp(step)) for step in steps)
-        return ((wider - narrower) / (2 * _STEP))[:, :, None]
+        wider, narrower = (self._torque(block, np.exp(end)) for end in self.ends)
+        return ((wider - narrower) / (self.ends[0] - self.ends[1]))[:, :, None]
 
     def _torque(self, block: Block, factor: float) -> np.ndarray:
         """Torque (T, n) of the effects with another width of the joint."""
@@ -125,6 +126,17 @@ class WidthSlope(Effect):
         other = replace(block, friction_width=widths)
         pairs = zip(self.of, self.values, strict=True)
         return np.sum([one.columns(other) @ np.array(x) for one, x in pairs], axis=0)
+
+
+@dataclass(frozen=True)
+class WidthSecant(WidthSlope):
+    """The same up to ten times the width: one that is far too narrow has no derivative to speak of.
+
+    Friction has turned at nearly every row, and a little wider it has, too.
+    """
+
+    name: ClassVar[str] = "wider friction"
+    ends: ClassVar[tuple[float, float]] = (np.log(10.0), 0.0)
 
 
 def width_slope(model: Model, values: np.ndarray, joint: str) -> WidthSlope | None:
