@@ -24,6 +24,7 @@ from dynident.tables import listed, number
 _CLEARLY = 4.0
 """Standard errors of the change of a width from which it is no chance: of healthy arms' joints 3 is
 the most that was seen."""
+_FAR = 0.2  # part of a secant from which a width is far off: the tangent sees what is nearer
 _MATTERS = 2.0  # standard errors that a Coulomb friction is off by, from which an interval fails
 _ENOUGH = 100_000  # samples that tell a width: more would double the time of a long fit
 
@@ -101,9 +102,10 @@ def _unsuited(given: Estimate, wide: Estimate, columns: Sequence[WidthSlope]) ->
         off = (wide.values[: model.size] - given.values) / given.sigma
     levels = coulomb_levels(model, off)
     for one in columns:
-        joint, z = str(one.joint), float(change[wide.model.slices[one.label].start])
-        j = robot.names.index(joint)
-        if abs(z) > _CLEARLY and abs(levels[j]) > _MATTERS:
+        joint, at = str(one.joint), wide.model.slices[one.label].start
+        j, z = robot.names.index(joint), float(change[at])
+        is_little = isinstance(one, WidthSecant) and abs(wide.values[at]) < _FAR
+        if abs(z) > _CLEARLY and abs(levels[j]) > _MATTERS and not is_little:
             width = f"{number(float(model.friction_widths[j]), 2)} {robot.units[j]}/s"
             found.append(_Unsuited(joint, width, z))
     return found
