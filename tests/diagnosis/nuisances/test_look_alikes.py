@@ -18,6 +18,7 @@ from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
 from synthetic import arm, synthetic, true_values
+from torso import WAIST
 
 PROBLEMS = Path(__file__).resolve().parents[3] / "problems"
 
@@ -61,18 +62,6 @@ def test_a_payload_on_another_branch_is_said_not_to_be_sought() -> None:
         found = notes_on(Model(robot), Model(robot))
         assert len(found) == len(notes)
         assert all(words in one for words, one in zip(notes, found, strict=True))
-
-
-WAIST = """<robot name="torso"><link name="base"/>
-  <link name="trunk"><inertial><origin xyz="0.05 0.02 0.2"/><mass value="6"/>
-    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.05"/></inertial></link>
-  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
-    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
-  <joint name="waist" type="revolute"><parent link="base"/><child link="trunk"/>
-    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="4" effort="99"/></joint>
-  <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="arm"/>
-    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="4" effort="99"/></joint></robot>"""
 
 
 def notes_on(given: Model, true: Model, *added: str) -> tuple[str, ...]:

@@ -10,24 +10,15 @@ from dynident.recording import Dataset
 from dynident.robot import Robot
 from dynident.tables import number
 from synthetic import synthetic, true_values
+from torso import WAIST
 
-TORSO = """<robot name="torso"><link name="base"/>
-  <link name="trunk"><inertial><origin xyz="0.05 0.02 0.2"/><mass value="6"/>
-    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.05"/></inertial></link>
-  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
-    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
-  <joint name="waist" type="revolute"><parent link="base"/><child link="trunk"/>
-    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="4" effort="99"/></joint>
-  <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="arm"/>
-    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="4" effort="99"/></joint></robot>"""
 TILT = np.array([0.04, 0.03])
 GRANTED = "takes for granted that there is no unbalance at waist"
 
 
 def tilted(seed: int, moment: float = 0.03) -> Dataset:
     """A torso on a tilt, whose description is off by so many kg m beside its axis."""
-    true = Model(Robot.from_text(TORSO)) + "base_tilt" + "unbalance@waist"
+    true = Model(Robot.from_text(WAIST)) + "base_tilt" + "unbalance@waist"
     values = true_values(true)
     values[true.slices["base_tilt"]] = TILT
     values[true.slices["unbalance@waist"]] = 9.81 * moment * np.array([TILT[1], -TILT[0]])
@@ -40,7 +31,7 @@ def off(found: Estimate) -> np.ndarray:
 
 
 def test_sigma_says_what_it_takes_for_granted_and_what_it_would_be_else() -> None:
-    given = Model(Robot.from_text(TORSO)) + "base_tilt"
+    given = Model(Robot.from_text(WAIST)) + "base_tilt"
     granted, known = [], []
     for seed in range(12):
         narrow = fit(given, tilted(seed))
@@ -59,7 +50,7 @@ def test_sigma_says_what_it_takes_for_granted_and_what_it_would_be_else() -> Non
 
 
 def test_nothing_is_said_without_a_tilt_and_a_table_s_rows_stay_independent() -> None:
-    given = Model(Robot.from_text(TORSO))
+    given = Model(Robot.from_text(WAIST))
     assert GRANTED not in fit(given, tilted(0)).words_of_sigma
     plain = fit(given + "base_tilt", tilted(0), LeastSquares(errors="independent"))
     assert GRANTED in plain.words_of_sigma and plain.takes_rows_as_independent
