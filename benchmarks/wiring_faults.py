@@ -5,7 +5,8 @@
 
 Robots of two, six and seven joints with lengths, masses and friction drawn at random are simulated
 in closed loop (`blind_study.robots`); their user is told other masses. With `--problems` the faults
-go into the recordings of these problems instead. The table says how often each kind of fault was
+go into the recordings of these problems instead. Beside them are studies that state another gravity
+than there was. The table says how often each kind of fault was
 named, kind and joints, how often the likely ratio of a gear was within a quarter of the true one,
 whether the recordings without a fault were left alone, and how long a check took.
 """
@@ -48,12 +49,20 @@ class Injected:
     joints : numbers of the joints that are to be named.
     change : what is done to each recording.
     ratio : of the gear, where there is one.
+    gravity : (3,) m/s^2 that the study states, where it has that wrong.
     """
 
     kind: tuple[str, ...]
     joints: tuple[int, ...]
     change: Change
     ratio: float | None = None
+    gravity: tuple[float, ...] | None = None
+
+    def told(self, model: Model) -> Model:
+        """The model as its user has it."""
+        if self.gravity is None:
+            return model
+        return replace(model, robot=model.robot.with_gravity(self.gravity))
 
     def is_named(self, found: tuple[Fault, ...], names: tuple[str, ...]) -> bool:
         """Whether it was reported, first of all faults."""
@@ -96,6 +105,12 @@ def _gears(i: int) -> Iterator[Injected]:
     )
     yield Injected(("motor_side_position",), (i,), lambda r: _changed(r, q=(i, position)), position)
     yield Injected(("motor_side_torque",), (i,), lambda r: _changed(r, tau=(i, 1 / torque)), torque)
+
+
+def mounting_faults() -> Iterator[Injected]:
+    """Yield mountings that a study forgets, of robots that stand upright, or has wrong."""
+    for gravity in ((9.81, 0.0, 0.0), (0.0, -9.81, 0.0), (0.0, 0.0, 9.81), (5.9, 4.9, -6.1)):
+        yield Injected(("gravity",), (), lambda r: r, gravity=gravity)
 
 
 def data_faults(n: int) -> Iterator[Injected]:
@@ -211,12 +226,12 @@ def tried(
     healthy.named += not said
     healthy.seconds += time.perf_counter() - started
     failures += [f"{label}: nothing is wrong, but: {one.sentence}" for one in said]
-    faults = [*column_faults(model.robot.n)]
+    faults = [*column_faults(model.robot.n), *mounting_faults()]
     if all(one.period for one in train.recordings):
         faults += data_faults(model.robot.n)
     for fault in faults:
         started = time.perf_counter()
-        said = check_wiring(model, broken(train, fault.change))
+        said = check_wiring(fault.told(model), broken(train, fault.change))
         one = count.setdefault(fault.kind[0], Count())
         one.seconds += time.perf_counter() - started
         one.total += 1

@@ -36,6 +36,12 @@ class WiringCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    least_turn: float = criterion(
+        0.5,
+        "rad",
+        "turn of gravity from which the study is said to have it wrong: less is a tilted base",
+        over=0,
+    )
     most_faults: int = criterion(3, "faults", "faults of columns that are looked for", least=1)
     poor_fit: float = criterion(
         0.2, "1", "residual over torque above which gears are looked for at every joint", over=0

@@ -19,6 +19,7 @@ FaultKind = Literal[
     "motor_side_position",
     "motor_side_torque",
     "torque_scale",
+    "gravity",
     "same_data",
     "one_source",
     "period",
@@ -33,7 +34,7 @@ class Fault:
     Attributes
     ----------
     kind : of fault.
-    joints : names of the joints that it is about; empty where it is about whole recordings.
+    joints : names of those that it is about; empty where it is about the robot, or recordings.
     what : in a few words, "sign of tau.elbow".
     evidence : what shows it, a sentence.
     mend : lines of the study file that mend it; empty where the data do not tell them.

@@ -12,6 +12,7 @@ from dynident.tables import percent
 from dynident.wiring.assignment import DEGREE, Assignment, Hypothesis
 from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.hypothesis_search import Accepted, SearchResult
+from dynident.wiring.wiring_regression import TorqueFit
 
 IN_COLUMNS = "Write in [columns] of the study, in place of lines for the same columns"
 _OF_SCREWS = (
@@ -153,11 +154,16 @@ def _evidence(model: Model, one: Accepted, kind: FaultKind) -> str:
     ]
     lower = after.fit_score - before.fit_score > 0.1
     if lower:
-        left = [percent(float(np.sqrt(np.mean(x.unexplained)))) for x in (before, after)]
-        said.append(f"with it mended a fit leaves {left[1]} of the torque instead of {left[0]}")
+        said.append(residuals(before, after))
     if negative and (kind.endswith(("sign", "signs")) or not lower):
         said.append(f"as recorded, inertia or friction at {', '.join(negative)} come out negative")
     return ", and ".join(said) or "the equations of motion fit far better with it mended"
+
+
+def residuals(before: TorqueFit, after: TorqueFit) -> str:
+    """What is left of the torque with a fault mended, and without."""
+    left = [percent(one.misfit) for one in (before, after)]
+    return f"with it mended a fit leaves {left[1]} of the torque instead of {left[0]}"
 
 
 def column_lines(assignment: Assignment, recording: Recording) -> tuple[str, ...]:

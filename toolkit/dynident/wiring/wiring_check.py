@@ -12,12 +12,13 @@ from dynident.fitting.reversals.standing_joints import without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
-from dynident.wiring.assignment import DEGREE, MILLI
+from dynident.wiring.assignment import DEGREE, MILLI, Assignment
 from dynident.wiring.described_torque import moves_as_described
 from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.fault_words import IN_COLUMNS, column_lines, faults_of
 from dynident.wiring.gear_ratios import turns_too_far
-from dynident.wiring.hypothesis_search import SearchResult, search
+from dynident.wiring.hypothesis_search import SearchResult, is_better_by_far, search
+from dynident.wiring.mounting import mounting
 from dynident.wiring.position_filter import unsuitable_position_filter
 from dynident.wiring.same_data import shared_recordings, twice_recorded
 from dynident.wiring.stated_period import wrong_periods
@@ -66,13 +67,33 @@ def check_wiring(
     if any(fault.kind == "one_source" for fault in found):
         return tuple(found)  # every assignment of a column that is not there fits badly
     rows = rows_of(_but_stops(model, train), criteria.rows, criteria.independent_hz)
-    result = search(model, rows, criteria)
-    named = faults_of(model, result, train.recordings[0])
+    model, result, mounted = _searched(model, rows, criteria)
+    named = (*mounted, *faults_of(model, result, train.recordings[0]))
     far = _out_of_range(model, rows, result, train, criteria)
     faults = (*found, *named, *far)
     # Where a column is not what it is called, no filter makes it so.
     slowest = min(one.rate_hz for one in every.recordings)
     return faults or unsuitable_position_filter(model, train, slowest, criteria)
+
+
+def _searched(
+    model: Model, rows: WiringRows, criteria: WiringCriteria
+) -> tuple[Model, SearchResult, tuple[Fault, ...]]:
+    """Search the columns, and again under another gravity if that suits them far better.
+
+    A base that is mounted otherwise may look like columns that are not what they are called, and
+    these like another mounting: what leaves less by far is taken, and columns if neither does.
+    """
+    result = search(model, rows, criteria)
+    recorded = Assignment.as_recorded(model.robot.n)
+    for now in (recorded, result.assignment) if result.accepted else (recorded,):
+        found = mounting(model, rows, now, criteria)
+        if found is None:
+            continue
+        other = search(found.model, rows, criteria)
+        if is_better_by_far(other.fit, result.fit, rows, criteria):
+            return found.model, other, (found.fault,)
+    return model, result, ()
 
 
 def _but_stops(model: Model, train: Dataset) -> Dataset:

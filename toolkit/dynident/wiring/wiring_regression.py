@@ -59,6 +59,11 @@ class TorqueFit:
         """The part of the score that the residual makes."""
         return -0.5 * float(np.sum(np.log(np.maximum(self.unexplained, _LEAST))))
 
+    @property
+    def misfit(self) -> float:
+        """Share of the torque that the fit leaves, joints alike."""
+        return float(np.sqrt(np.mean(self.unexplained)))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WiringRegression:

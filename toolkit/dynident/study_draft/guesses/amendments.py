@@ -23,6 +23,9 @@ from dynident.study_draft.guesses.motor_side import coupled, expression_of, turn
 from dynident.study_draft.guesses.wiring_guess import guess_wiring
 from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
+from dynident.wiring.assignment import Assignment
+from dynident.wiring.hypothesis_search import is_better_by_far
+from dynident.wiring.mounting import mounting
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
@@ -96,26 +99,19 @@ def amended(
 
 def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """A base on the ceiling or on a wall."""
-    size = float(np.linalg.norm(reading.robot.gravity))
     rows = reading.rows(recordings)
-    if rows is None or not size:
+    if rows is None:
         return None
-    start = _fit(reading.robot, rows)
-    tried = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            robot = reading.robot.with_gravity(sign * size * np.eye(3)[axis])
-            tried.append((robot, _fit(robot, rows)))
-    robot, best = max(tried, key=lambda one: one[1].score)
-    if not wins(best, start, rows):
+    robot = reading.robot
+    found = mounting(Model(robot), rows, Assignment.as_recorded(robot.n), DEFAULTS.wiring)
+    if found is None:
         return None
-    shown = ", ".join(f"{x:g}" for x in robot.gravity)
     return Amendment(
         subject="gravity",
-        what=f"gravity = [{shown}] in the base's axes",
-        why=evidence(start, best),
-        left=misfit(best),
-        reading=replace(reading, robot=robot),
+        what=f"gravity = {found.shown} in the base's axes",
+        why=evidence(found.before, found.after),
+        left=found.after.misfit,
+        reading=replace(reading, robot=found.model.robot),
     )
 
 
@@ -134,7 +130,7 @@ def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | N
         subject="zeros",
         what=f"moved: {', '.join(moved)}",
         why=evidence(guess.start, guess.best) + guess.evidence,
-        left=misfit(guess.best),
+        left=guess.best.misfit,
         reading=replace(reading, columns=turned(reading.columns, robot, guess.quarters)),
     )
 
@@ -200,7 +196,7 @@ def _coupling(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment 
         subject="coupling",
         what=one.words,
         why=guess.reason,
-        left=misfit(_fit(reading.robot, moved)),
+        left=_fit(reading.robot, moved).misfit,
         reading=after,
     )
 
@@ -238,19 +234,12 @@ def wins(best: TorqueFit, start: TorqueFit, rows: WiringRows) -> bool:
     -------
     True if it is.
     """
-    gain = best.score - start.score
-    criteria = DEFAULTS.wiring
     # What no fit leaves less of is not mended, whatever became possible by it.
-    better = misfit(best) < misfit(start)
-    return better and gain >= criteria.gain and gain * rows.independent >= criteria.evidence
-
-
-def misfit(fit: TorqueFit) -> float:
-    """Share of the torque that a fit leaves."""
-    return float(np.sqrt(np.mean(fit.unexplained)))
+    better = best.misfit < start.misfit
+    return better and is_better_by_far(best, start, rows, DEFAULTS.wiring)
 
 
 def evidence(start: TorqueFit, best: TorqueFit) -> str:
     """What shows that one fit is better than another."""
-    left = [percent(misfit(one)) for one in (best, start)]
+    left = [percent(one.misfit) for one in (best, start)]
     return f"a fit then leaves {left[0]} of the torque instead of {left[1]}"
