@@ -115,11 +115,16 @@ def test_a_shape_that_is_given_is_refined_though_it_is_one_that_is_screened() ->
 
 
 @pytest.mark.slow
-def test_a_gap_that_is_given_is_refined() -> None:
-    """From the few shapes of the grid, as it is not missing: 0.053 without it."""
-    made = recordings(*truth("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3)))
+@pytest.mark.parametrize(("gap", "shape"), [(0.003, (20.0, 0.1, 0.3)), (0.004, (36.0, 0.2, 0.5))])
+def test_a_gap_that_is_given_is_sought_beyond_the_grid(
+    gap: float, shape: tuple[float, float, float]
+) -> None:
+    """From the few shapes of the grid gaps of 3.2 and 3.6 mrad come out, with 0.02 and 0.008."""
+    made = recordings(*truth("backlash@shoulder", (gap,), shape))
     found = find(PLAIN + "backlash@shoulder", Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
-    assert found.test_error.before < 0.03
+    assert found.test_error.before < 0.006
+    before = found.before
+    assert before.values[before.names.index("gap@shoulder")] == pytest.approx(gap, rel=0.05)
 
 
 @pytest.mark.slow

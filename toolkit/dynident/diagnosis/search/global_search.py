@@ -15,10 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from dynident.diagnosis.dependence.bursts import beyond_reversals, bursts_in
+from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
@@ -33,18 +35,32 @@ from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RankedModel:
-    """A model, and what is missing from it by the ranking or the global search.
+class FittedModel:
+    """A model in which something is sought.
 
     Attributes
     ----------
     evidence : that it is fitted to: who carries a payload may be known of one model alone.
-    fitted, ranking : the fit, and candidates for it.
+    fitted : the fit.
     """
 
     evidence: Evidence
     fitted: EvidenceFit
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RankedModel(FittedModel):
+    """A model, and what is missing from it by the ranking or the global search.
+
+    Attributes
+    ----------
+    ranking : candidates for it.
+    """
+
     ranking: Ranking
+
+
+AnyModel = TypeVar("AnyModel", bound=FittedModel)
 
 
 def global_search(
@@ -85,13 +101,27 @@ def global_search(
     return None
 
 
+def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect:
+    """Return an effect at the best of all its shapes and values; as it is where none explains much.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model without the effect.
+    effect : of many shapes, see `Effect.sought_in`.
+    """
+    base = FittedModel(evidence=evidence, fitted=fitted)
+    _, found = _searched((base,), base, (effect,), (), lambda _: None)
+    return refined(evidence, fitted, found[0][1]).effect if found else effect
+
+
 def _searched(
-    bases: Sequence[RankedModel],
-    base: RankedModel,
+    bases: Sequence[AnyModel],
+    base: AnyModel,
     sought: Sequence[Effect],
     earlier: Sequence[ShapeSolution[ScoreTrial]],
     progress: Callable[[str], None],
-) -> tuple[list[ShapeSolution[ScoreTrial]], list[tuple[float, Score, RankedModel]]]:
+) -> tuple[list[ShapeSolution[ScoreTrial]], list[tuple[float, Score, AnyModel]]]:
     """Search the shapes of each effect in what one of the models leaves of its worst recording.
 
     Returns all searches, with the earlier ones, and the best of them for each of the models.
@@ -154,8 +184,8 @@ def _felt(fitted: EvidenceFit) -> np.ndarray:
 
 
 def _finals(
-    bases: Sequence[RankedModel], searches: Sequence[ShapeSolution[ScoreTrial]]
-) -> list[tuple[float, Score, RankedModel]]:
+    bases: Sequence[AnyModel], searches: Sequence[ShapeSolution[ScoreTrial]]
+) -> list[tuple[float, Score, AnyModel]]:
     """The best of what was found for each model, and its share of what that model leaves."""
     every = [
         (one, _final(one.evidence, one.fitted, searches))
@@ -200,7 +230,7 @@ def _fall(found: ShapeSolution[ScoreTrial]) -> float:
     return -found.best[0].loss if found.best else 0.0
 
 
-def _worst_recordings(base: RankedModel, most: int) -> tuple[Evidence, EvidenceFit]:
+def _worst_recordings(base: FittedModel, most: int) -> tuple[Evidence, EvidenceFit]:
     """Recordings with most systematic residual over noise, and the model as they alone fit it."""
     evidence, fitted = base.evidence, base.fitted
     left = residuals(evidence, fitted.model, fitted.values)

@@ -21,8 +21,12 @@ from dynident.fitting.estimate import Estimate, ShapeValue
 from dynident.fitting.row_objective import shaped_effects
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope, width_slope
 from dynident.model import Model
+from dynident.tables import listed
 
-_KNOWN = "sigma takes {} as known, which they are not."
+_KNOWN = (
+    " The parameters inside {} count as known in it, which they are not: what {} has beside them "
+    "may be off by several sigma."
+)
 _QUANTILE = 1.959964
 """Standard errors to each side of a 95 % interval."""
 _AT_BOUND = "{} = {:.4g} {} is at the end of where it is sought: the best may lie beyond."
@@ -54,7 +58,7 @@ def with_shape_errors(
         for e in shaped
         if fit and not e.nonlinear and np.any(estimate.effect_values(e.label))
     )
-    known = [e.label for e in shaped if e.label not in {s.effect.label for s in slopes}]
+    known = [e.title for e in shaped if e.label not in {s.effect.label for s in slopes}]
     sought = [width_slope(model, estimate.values, joint) for joint in widths]
     added = (*slopes, *(one for one in sought if one is not None))
     sigma: dict[str, np.ndarray] = {}
@@ -79,7 +83,9 @@ def with_shape_errors(
             )
     notes = (*estimate.notes, *shapes_at_ends(model).values())
     if known and np.any(estimate.covariance):
-        notes = (*notes, _KNOWN.format(f"the shapes of {', '.join(known)}"))
+        named, it = listed(known), "it" if len(known) == 1 else "each"
+        words = estimate.words_of_sigma + _KNOWN.format(named, it)
+        estimate = replace(estimate, sigma_words=words)
     return replace(estimate, shapes=tuple(found), notes=notes)
 
 
