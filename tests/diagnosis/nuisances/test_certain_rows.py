@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.nuisances.quantisation import rounding_power
 from dynident.diagnosis.nuisances.width_notes import found_widths
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence
@@ -18,6 +17,7 @@ from dynident.evidence.maps import residual_maps
 from dynident.evidence.noise_model import NoiseModel
 from dynident.evidence.runs import Run, gather
 from dynident.evidence.stacks import Stack
+from dynident.fitting.uncertainty.encoder_steps import rounding_power
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -84,10 +84,11 @@ def test_steps_of_encoders_count_where_the_residual_does() -> None:
     fitted = fit_evidence(of, model)
     seen = on_recordings(of, fitted)
     assert seen.ratio is not None and seen.noise_std is not None
-    found = np.sqrt(rounding_power(fitted, data, seen.runs))
+    rows = [(one.t, one.certain) for one in seen.runs]
+    found = np.sqrt(rounding_power(model, fitted.values, data, mean, rows))
     np.testing.assert_allclose(found, seen.ratio * seen.noise_std, rtol=0.3)
     # The shoulder shows mostly the steps in its inertia, at all speeds.
-    assert np.sqrt(rounding_power(fitted, data))[1] > 2.0 * found[1]
+    assert np.sqrt(rounding_power(model, fitted.values, data, mean))[1] > 2.0 * found[1]
 
 
 def test_sigma_is_of_the_rows_that_count(model: Model) -> None:

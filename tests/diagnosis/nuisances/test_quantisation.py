@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnosis.nuisances.quantisation import mean_rounding, rounding_power
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
+from dynident.fitting.uncertainty.encoder_steps import mean_rounding, rounding_power
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from synthetic import arm, synthetic, true_values
@@ -42,7 +42,7 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
     assert judged.ratio is not None and judged.noise_std is not None
     left = judged.ratio * judged.noise_std
     assert (left > 3.0 * judged.noise_std).all(), "rounding is not to be seen"
-    predicted = np.sqrt(rounding_power(fitted, runs))
+    predicted = np.sqrt(rounding_power(model, fitted.values, runs))
     np.testing.assert_allclose(predicted, left, rtol=0.3)
 
 
@@ -64,7 +64,7 @@ def test_steps_much_smaller_than_the_noise_leave_nothing_that_repeats(model: Mod
     noisy = clean.q + 2e-5 * np.random.default_rng(1).standard_normal(clean.q.shape)
     runs = Dataset((replace(clean, q=np.round(noisy / 1e-5) * 1e-5),))
     fitted = fit_evidence(Evidence(model, gather(runs)), model)
-    np.testing.assert_array_equal(rounding_power(fitted, runs), np.zeros(2))
+    np.testing.assert_array_equal(rounding_power(model, fitted.values, runs), np.zeros(2))
 
 
 def test_jumps_of_a_position_are_no_noise_that_could_repeat(model: Model) -> None:
@@ -74,15 +74,16 @@ def test_jumps_of_a_position_are_no_noise_that_could_repeat(model: Model) -> Non
     jumped[len(jumped) // 2 :, 0] += 5000 * STEP
     evidence = Evidence(model, gather(Dataset((one,))))
     fitted = fit_evidence(evidence, model)
-    usual = rounding_power(fitted, Dataset((one,)))
-    found = rounding_power(fitted, Dataset((replace(one, q=jumped),)))
+    usual = rounding_power(model, fitted.values, Dataset((one,)))
+    found = rounding_power(model, fitted.values, Dataset((replace(one, q=jumped),)))
     assert np.all(found <= 2.0 * usual)
 
 
 def test_there_is_none_without_steps(model: Model) -> None:
     runs = Dataset(recordings(model, 0.0, 1e-3, 1))
     evidence = Evidence(model, gather(runs))
-    np.testing.assert_array_equal(rounding_power(fit_evidence(evidence, model), runs), np.zeros(2))
+    values = fit_evidence(evidence, model).values
+    np.testing.assert_array_equal(rounding_power(model, values, runs), np.zeros(2))
 
 
 @pytest.mark.slow

@@ -10,7 +10,9 @@ from dynident import IV, Constrained, Regression
 from dynident.errors import RecordingError
 from dynident.fitting import Estimate, LeastSquares, Method, SwappedPeriods, fit, load_estimate
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
+from dynident.model import Model
 from dynident.recording import Dataset, Filter, suited_filter
+from synthetic import arm, synthetic, true_values
 
 STD = (0.5, 0.2)
 
@@ -63,6 +65,38 @@ def test_friction_of_a_whole_model_turns_round_when_the_joint_does_behind_fine_e
             assert judged is not None
             left[i] += judged.systematic**2
     assert np.all(left[0] < (0.25 * left[1][0], 0.7 * left[1][1]))
+
+
+def rounded(step: float, off: float) -> Dataset:
+    """Two repetitions behind encoders with steps (rad), whose positions are moved off them."""
+    model, rng = Model(arm()) + "viscous_friction", np.random.default_rng(3)
+    truth = true_values(model, Fv__shoulder=1.2, Fv__elbow=0.5)
+    one = synthetic(model, truth, 0, rate_hz=250.0, torque_std=0.1)
+    q = np.round(one.q / step) * step
+    return Dataset((one.replace(q=q + off * rng.standard_normal(q.shape)),))
+
+
+def test_steps_of_encoders_that_repeat_with_the_motion_reject_no_model() -> None:
+    """The same residual, of positions that lie on no lattice, does."""
+    model = Model(arm()) + "viscous_friction"
+    healthy = fit(model, rounded(2e-4, 0.0))
+    assert not healthy.headline
+    (note,) = (one for one in healthy.notes if "no more than the steps of the encoders" in one)
+    assert "steps of encoders up to" in note
+    assert "cluster sandwich" in healthy.words_of_sigma
+    assert "The model is rejected" in fit(model, rounded(2e-4, 1e-7)).headline
+
+
+def test_steps_of_encoders_do_not_hide_what_is_more_than_they_leave() -> None:
+    model = Model(arm()) + "viscous_friction"
+    with_drag = Dataset(
+        tuple(
+            one.replace(tau=one.tau + 3.0 * np.tanh(np.gradient(one.q, one.t, axis=0) / 0.5))
+            for one in rounded(2e-4, 0.0).recordings
+        )
+    )
+    headline = fit(model, with_drag).headline
+    assert "The model is rejected" in headline and "steps of encoders up to" in headline
 
 
 def test_without_repetition_nothing_rejects_a_model() -> None:

@@ -19,6 +19,7 @@ from dynident.errors import RecordingError
 from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
+from dynident.fitting.uncertainty.encoder_steps import rounding_power
 from dynident.model import Model
 from dynident.recording import (
     Dataset,
@@ -27,15 +28,13 @@ from dynident.recording import (
     as_points,
     periods,
     require_repetition,
-    resolution,
     turning_round,
 )
-from dynident.tables import listed, number
+from dynident.tables import number
 
 _REJECTED = 4.0
 """Standard deviations under the noise alone above which a joint's residual is systematic. Measured:
 3.5 is the largest of 600 joints to which nothing was missing."""
-_LOOKED_AT = 20_000  # samples that show an encoder's steps
 _LAGS = 20  # rows up to which noise is correlated
 
 
@@ -49,7 +48,9 @@ class LackOfFit:
     systematic : (n,) root mean square of what repetitions have in common, N m or N.
     noise : (n,) standard deviation of what they have not.
     excess : (n,) mean square of the former in standard deviations under the noise alone.
-    stepped : joints whose encoders are seen to have steps, where the model is rejected.
+    steps : (n,) root mean square of what encoders' steps leave at most, the same in every
+        repetition, N m or N; looked at where more than noise is there.
+    beyond_steps : (n,) as `excess`, of what is more than the steps leave.
     """
 
     joints: tuple[str, ...]
@@ -57,40 +58,52 @@ class LackOfFit:
     systematic: np.ndarray
     noise: np.ndarray
     excess: np.ndarray
-    stepped: tuple[str, ...] = ()
+    steps: np.ndarray
+    beyond_steps: np.ndarray
+
+    @property
+    def beyond_noise(self) -> bool:
+        """Whether repetitions have more in common than noise leaves, beyond doubt."""
+        return bool(np.any(self.excess > _REJECTED))
 
     @property
     def rejected(self) -> bool:
         """Whether the model lacks something, beyond doubt."""
-        return bool(np.any(self.excess > _REJECTED))
+        return bool(np.any(self.beyond_steps > _REJECTED))
 
     @property
     def headline(self) -> str:
         """What is to be read before any number; empty where nothing speaks against the model."""
         if not self.rejected:
             return ""
-        parts = [
-            f"{number(self.systematic[j], 2)} {self.units[j]} at {joint} (noise "
-            f"{number(self.noise[j], 2)})"
-            for j, joint in enumerate(self.joints)
-            if self.excess[j] > _REJECTED
-        ]
         return (
             "The model is rejected by the repetitions of its motion: what they have in common in "
-            f"the residual is no noise, {', '.join(parts)}. Parameters may be off by more than "
-            f"sigma says. {self._steps}What is missing, or whether dry friction only reverses over "
+            f"the residual is no noise, {self._at(self.beyond_steps)}. Parameters may be off by "
+            "more than sigma says. What is missing, or whether dry friction only reverses over "
             "another width than is stated, `dynident explain` tells."
         )
 
     @property
-    def _steps(self) -> str:
-        """That encoders' steps repeat with a motion; empty where no encoder has any."""
-        if not self.stepped:
+    def note(self) -> str:
+        """That steps of encoders may be all that repetitions have in common; empty where not."""
+        if self.rejected or not self.beyond_noise:
             return ""
         return (
-            f"The steps of the encoders at {listed(self.stepped)} repeat with the motion, too, and "
-            "may be a part of it. "
+            "What the repetitions of the motion have in common in the residual is no noise, "
+            f"{self._at(self.excess)}, and no more than the steps of the encoders may leave, which "
+            "repeat with the motion. What is smaller than that cannot be told from them."
         )
+
+    def _at(self, excess: np.ndarray) -> str:
+        """What is in common at joints at which it is too much, and what may be a part of it."""
+        parts = []
+        for j in np.flatnonzero(excess > _REJECTED).tolist():
+            own, noise, steps = (
+                number(one[j], 2) for one in (self.systematic, self.noise, self.steps)
+            )
+            more = f", steps of encoders up to {steps}" if self.steps[j] > 0 else ""
+            parts.append(f"{own} {self.units[j]} at {self.joints[j]} (noise {noise}{more})")
+        return ", ".join(parts)
 
 
 def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit | None:
@@ -117,19 +130,24 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     if not found:
         return None
     systematic, noise, spread, rows = (np.sum(one, axis=0) for one in zip(*found, strict=True))
+    scale = np.sqrt(np.maximum(spread, np.finfo(float).tiny))
     judged = LackOfFit(
         joints=model.robot.names,
         units=model.robot.torque_units,
         systematic=np.sqrt(np.maximum(systematic / rows, 0.0)),
         noise=np.sqrt(noise / rows),
-        excess=systematic / np.sqrt(np.maximum(spread, np.finfo(float).tiny)),
+        excess=systematic / scale,
+        steps=np.zeros(model.robot.n),
+        beyond_steps=systematic / scale,
     )
-    if not judged.rejected:
+    if not judged.beyond_noise:
         return judged
-    periodic = [one for one in dataset.recordings if one.period]
-    steps = np.any([resolution(one.q[:_LOOKED_AT]) > 0 for one in periodic], axis=0)
-    stepped = [joint for joint, one in zip(judged.joints, steps, strict=True) if one]
-    return replace(judged, stepped=tuple(stepped))
+    periodic = tuple(one for one in dataset.recordings if one.period)
+    counting = [(one.t, one.counting) for one in (sample(r, dataset.filter) for r in periodic)]
+    repeated = replace(dataset, recordings=periodic)
+    power = rounding_power(model, values, repeated, judged=counting)
+    beyond = (systematic - rows * power) / scale
+    return replace(judged, steps=np.sqrt(power), beyond_steps=beyond)
 
 
 def _of_recording(
