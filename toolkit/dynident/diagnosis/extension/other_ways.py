@@ -97,15 +97,17 @@ def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage
     passing = {one.effect.label for one in first.passing}
     alone = [one for one in first.scores if one.effect.label not in passing and one.drop > 0.0]
     begun = [one for one in alone if not one.not_identifiable][:_WAYS]
+    two = replace(task, most=min(task.most, 2))
     for tried, one in enumerate(begun, 1):
         label = one.effect.label
         task.progress(f"beginning with {label}, whatever its significance")
         waits = f"asked again beside {label}"
         refusals = ("" if other is one else waits for other in first.scores)
-        other = extend(_from(start, replace(first, refusals=tuple(refusals))), task)
-        if len(other.found) < 2 or set(other.doubtful) != set(extended.doubtful):
+        pair = extend(_from(start, replace(first, refusals=tuple(refusals))), two)
+        alike = set(pair.doubtful) == set(extended.doubtful)
+        if not (alike and len(pair.found) == 2 and _is_enough(pair)):
             continue
-        both = _without_its_first(other, task)
+        both = _without_its_first(pair, task)
         if _is_enough(both) and _is_enough_for_others(both):
             # As many beginnings are as many searches.
             found = (replace(f, p_value=min(1.0, tried * f.p_value)) for f in both.found)
