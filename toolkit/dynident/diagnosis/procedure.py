@@ -44,15 +44,10 @@ from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.path import Path, path_of, responses_in_place
-from dynident.diagnosis.search.payload_recordings import (
-    marked,
-    with_payload_decided,
-)
+from dynident.diagnosis.search.payload_recordings import marked
 from dynident.diagnosis.search.ranking import candidates
 from dynident.diagnosis.search.refusal import narrower
-from dynident.diagnosis.search.selection import (
-    without_superfluous,
-)
+from dynident.diagnosis.search.selection import without_superfluous
 from dynident.diagnosis.search.shaped_fit import shaped
 from dynident.diagnosis.switches import switches_of
 from dynident.effects import Effect
@@ -148,7 +143,7 @@ def diagnose(
     asked = left or propose == "always"
     if asked:
         progress("looking for what the residual depends on")
-        found = with_dependence(found, settled.evidence, _decided(settled), path)
+        found = with_dependence(found, settled.evidence, settled.judging, path)
     found = replace(found, notes=(*found.notes, *alike_notes(found)))
     return with_geometry_doubt(found, settled.evidence.runs)
 
@@ -220,7 +215,7 @@ def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
 def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     """Drop what is superfluous, confirm contacts, and withdraw what raises the held-out error."""
     evidence, start = stage.evidence, stage.start
-    held = _decided(stage)
+    held = stage.judging
     kept = without_superfluous(evidence, held, stage.fitted, list(stage.found), task.progress)
     final = kept.final
     contacts = stage.contacts.confirmed(evidence, held, final)
@@ -257,7 +252,7 @@ def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
 
 def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     """Say what held-out data say of the path that the model has gone."""
-    reached, held = stage.proposals >= task.most, _decided(stage)
+    reached, held = stage.proposals >= task.most, stage.judging
     search = Search(
         evidence=stage.evidence,
         path=path,
@@ -289,8 +284,3 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
     left = answer.verdict == "unexplained" and known and not answer.training_only
     # Where its limit ended the search, what the catalogue leaves is not known yet.
     return (bool(left) and answer.limit is None) or task.propose == "always"
-
-
-def _decided(stage: Stage) -> Evidence | None:
-    """The test recordings, with those marked that carry a payload of the model."""
-    return None if stage.held is None else with_payload_decided(stage.held, stage.fitted)

@@ -16,9 +16,7 @@ from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
 from dynident.diagnosis.nuisances.sticking import seen_alike, without_sticking
-from dynident.diagnosis.search.payload_recordings import (
-    with_payload,
-)
+from dynident.diagnosis.search.payload_recordings import with_payload
 from dynident.diagnosis.search.ranking import rank, unresolved
 from dynident.diagnosis.search.refusal import follows_the_filter, newly_impossible
 from dynident.diagnosis.search.selection import (

@@ -8,9 +8,9 @@ from dynident.diagnosis.extension.extending import extend, rank_stage
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
-from dynident.diagnosis.search.payload_recordings import with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.verdict import within_noise
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 
@@ -105,7 +105,7 @@ def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage
         refusals = ("" if other is one else waits for other in first.scores)
         pair = extend(_from(start, replace(first, refusals=tuple(refusals))), two)
         alike = set(pair.doubtful) == set(extended.doubtful)
-        if not (alike and len(pair.found) == 2 and _is_enough(pair)):
+        if not (alike and pair.proposals == 2 and _is_enough(pair)):
             continue
         both = _without_its_first(pair, task)
         if _is_enough(both) and _is_enough_for_others(both):
@@ -142,13 +142,14 @@ def _leaves_a_residual(start: Stage, extended: Stage) -> bool:
 
 def _is_enough_for_others(stage: Stage) -> bool:
     """Whether nothing but noise is left of the test recordings, where there are any."""
-    if stage.held is None:
-        return True
-    held = with_payload_decided(stage.held, stage.fitted)
-    return within_noise(on_recordings(held, stage.fitted), stage.evidence.criteria.verdict)
+    judging = stage.judging
+    return judging is None or _leaves_noise(judging, stage)
 
 
 def _is_enough(stage: Stage) -> bool:
     """Whether nothing but noise is left of the training recordings."""
-    trained = on_recordings(stage.evidence, stage.fitted)
-    return within_noise(trained, stage.evidence.criteria.verdict)
+    return _leaves_noise(stage.evidence, stage)
+
+
+def _leaves_noise(evidence: Evidence, stage: Stage) -> bool:
+    return within_noise(on_recordings(evidence, stage.fitted), evidence.criteria.verdict)

@@ -9,6 +9,7 @@ from typing import Literal
 from dynident.arguments import checked
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.search.global_search import RankedModel
+from dynident.diagnosis.search.payload_recordings import with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.evidence.evidence import Evidence
@@ -81,6 +82,11 @@ class Stage:
         return tuple(
             one for one, group in zip(self.found, groups, strict=True) if group == groups[-1]
         )
+
+    @property
+    def judging(self) -> Evidence | None:
+        """The test recordings, with those marked that carry a payload of the model."""
+        return None if self.held is None else with_payload_decided(self.held, self.fitted)
 
     @property
     def ranked(self) -> RankedModel:

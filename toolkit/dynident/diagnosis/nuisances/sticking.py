@@ -117,7 +117,7 @@ def without_reversals(
     """
     names, reach = evidence.model.robot.names, within or {}
     columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
-    wide = [j for j, least in columns if _may_widen(evidence, j, least)]
+    wide = _may_widen(evidence, columns)
     columns = [
         (j, least)
         for j, least in columns
@@ -201,14 +201,23 @@ def _widened(
 ) -> set[str]:
     """Joints of which rows that are rounded go, too."""
     names, reach = evidence.model.robot.names, within or {}
-    return {one for one in joints if _may_widen(evidence, names.index(one), reach.get(one, 0.0))}
+    columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
+    return {names[j] for j in _may_widen(evidence, columns)}
 
 
-def _may_widen(evidence: Evidence, j: int, least: float) -> bool:
-    """Whether a joint is seen to stand, and has enough rows without those that are rounded."""
+def _may_widen(evidence: Evidence, columns: Sequence[tuple[int, float]]) -> list[int]:
+    """Which joints are seen to stand, and have enough rows without those that are rounded.
+
+    Parameters
+    ----------
+    evidence : of the recordings.
+    columns : numbers of joints, each with the speed within which its friction is not known.
+    """
+    if not columns:
+        return []
     every = [_speeds(evidence, run) for run in evidence.runs]
-    stood = stands(every, evidence.criteria.sticking)[j]
-    return bool(stood) and _are_few(evidence, j, least, _near_rounded)
+    stood = stands(every, evidence.criteria.sticking)
+    return [j for j, least in columns if stood[j] and _are_few(evidence, j, least, _near_rounded)]
 
 
 def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:

@@ -91,6 +91,7 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
 
 
 def _wider(model: Model, columns: Sequence[WidthSlope]) -> Model:
+    """The model with the derivatives of its friction by widths as columns more."""
     return replace(model, effects=(*model.effects, *columns))
 
 
