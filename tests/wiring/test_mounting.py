@@ -84,6 +84,46 @@ def test_a_wrong_sign_beside_it_is_named_too() -> None:
     assert found[1].joints == (model().robot.names[1],)
 
 
+def turntable(gravity: tuple[float, ...]) -> di.Model:
+    """A load beside a vertical axis."""
+    text = (
+        '<robot name="turntable"><link name="base"/><link name="table"><inertial>'
+        '<mass value="20"/><origin xyz="0.2 0.05 0"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.5" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="turn" type="revolute"><axis xyz="0 0 1"/><parent link="base"/>'
+        '<child link="table"/><limit lower="-3" upper="3" velocity="9" effort="99"/></joint></robot>'
+    )
+    robot = di.Robot.from_text(text).with_gravity(gravity)
+    return di.Model(robot) + "viscous_friction"
+
+
+@pytest.mark.parametrize("degrees", [5.0, 10.0, 20.0])
+def test_of_a_vertical_axis_a_small_tilt_is_no_other_mounting(degrees: float) -> None:
+    """Lying on its side would do as well, with a lighter table."""
+    tilt = np.deg2rad(degrees)
+    true = turntable((9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt)))
+    recording = synthetic(true, true_values(true, Fv__turn=1.0), 0, torque_std=0.05)
+    assert check_wiring(turntable(STATED), Dataset((recording,))) == ()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_balancing_springs_of_a_planar_arm_are_no_other_mounting(share: float) -> None:
+    """They make smaller what gravity does, as turning it out of the plane would."""
+    heavy = di.Model(arm()) + "viscous_friction"
+    light = replace(heavy, robot=arm().with_gravity((0.0, 0.0, -9.81 * (1.0 - share))))
+    recording = synthetic(light, true_values(light), 0, torque_std=0.05)
+    assert check_wiring(heavy, Dataset((recording,))) == ()
+
+
+def test_a_planar_arm_without_gravity_is_not_said_to_lie_on_its_side() -> None:
+    heavy = di.Model(arm()) + "viscous_friction"
+    free = replace(heavy, robot=arm().with_gravity(FREE_FALL))
+    recording = synthetic(free, true_values(free), 0, torque_std=0.05)
+    found = check_wiring(heavy, Dataset((recording,)))
+    np.testing.assert_array_equal(stated(found), FREE_FALL)
+    assert "balanced" in found[0].what
+
+
 def test_a_planar_arm_may_have_its_first_zero_elsewhere() -> None:
     """Both joints turn about y: gravity along -x is a quarter turn of the first."""
     upright = di.Model(arm()) + "viscous_friction"

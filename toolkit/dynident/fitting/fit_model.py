@@ -110,10 +110,8 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     estimate, dataset = fitted_without(partial(_with_shapes, model, method=method), dataset)
     if not isinstance(method, LeastSquares):  # which widens its sigma by what speaks against it
         judged = lack_of_fit(estimate.model, dataset, estimate.values)
-        if judged is not None:
-            headline = " ".join(filter(None, (estimate.headline, judged.headline)))
-            notes = (*estimate.notes, *filter(None, [judged.note]))
-            estimate = replace(estimate, headline=headline, notes=notes)
+        said = (estimate.headline, judged.headline if judged is not None else "")
+        estimate = replace(estimate, headline=" ".join(filter(None, said)))
     else:
         with suppress(FitError):  # of a wider model than was asked for
             estimate = with_granted_effects(estimate, lambda one: method.fit(one, dataset))

@@ -82,17 +82,13 @@ class LeastSquares:
         found = row_errors(model, dataset, solution.values, solution, columns)
         covariance, words, headline = found.covariance, found.words, ""
         judged = lack_of_fit(model, dataset, solution.values)
-        notes = estimate.notes
         if judged is not None and judged.beyond_noise:
             other, words = scattered(model, dataset, solution.values, solution)
             covariance, headline = widened(covariance, other), judged.headline
-            notes = (*notes, judged.note) if judged.note else notes
         kept = list(solution.basis.independent)
         whole = np.zeros_like(solution.covariance)
         whole[np.ix_(kept, kept)] = covariance
-        estimate = replace(
-            estimate, covariance=whole, sigma_words=words, headline=headline, notes=notes
-        )
+        estimate = replace(estimate, covariance=whole, sigma_words=words, headline=headline)
         bias = input_bias(model, dataset, solution.values, solution, estimate.sigma)
         return estimate if bias is None else _with_bias(estimate, bias)
 

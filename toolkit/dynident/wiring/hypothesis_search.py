@@ -196,3 +196,17 @@ def is_better_by_far(
     """
     gain = after.score - before.score
     return gain >= criteria.gain and gain * rows.independent >= criteria.evidence
+
+
+def mends(after: TorqueFit, before: TorqueFit, rows: WiringRows, criteria: WiringCriteria) -> bool:
+    """Whether a fit is better by far and leaves less: more than that values became possible.
+
+    Parameters
+    ----------
+    after, before, rows, criteria : as for `is_better_by_far`.
+
+    Returns
+    -------
+    True if it is.
+    """
+    return after.misfit < before.misfit and is_better_by_far(after, before, rows, criteria)

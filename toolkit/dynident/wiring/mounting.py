@@ -2,7 +2,9 @@
 
 Gravity is no column: under another one other parameters are identifiable, and what a body weighs
 goes with its inertia. The regression is repeated with gravity from directions all around, and from
-the best of them the direction is refined.
+the best of them the direction is refined. Joints whose axes are parallel, or a single one, feel the
+part across them alone, which a spring or a counterweight makes smaller, too: there gravity is
+only turned about these axes, or taken off.
 """
 
 from __future__ import annotations
@@ -15,23 +17,27 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dynident.criteria import WiringCriteria
+from dynident.effects.bodies.turn import turn_about
 from dynident.model import Model
+from dynident.robot import Robot
+from dynident.robot.tree import GRAVITY
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault import Fault
 from dynident.wiring.fault_words import residuals
-from dynident.wiring.hypothesis_search import is_better_by_far
+from dynident.wiring.hypothesis_search import mends
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
-_EARTH = 9.81  # m/s^2, where the study states none
 _AXES = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
 _AROUND = tuple(
     np.array(d) / np.linalg.norm(d) for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)
 )
-_SIMPLEX = np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 0.3]])  # rad
+_TURNS = tuple(np.deg2rad(range(0, 360, 15)))  # about parallel axes
+_REACH = 0.2  # rad, of the first steps of a refinement
 _MOST_FITS = 60  # of a refinement: 0.01 rad and better
-_SAME_TURN = 0.02
-"""Of gravity, by which its part along the first axis may change if a zero is to do the same."""
+_PARALLEL = 0.02  # rad between axes that count as one
+_FALLS = 0.7  # of the torque that is left, to which another gravity must bring it
+_RISES = 4.0  # of a joint's squared residual, beyond which another gravity does not suit it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,25 +66,44 @@ class Mounting:
         """Gravity as a study file has it."""
         return _shown(self.gravity)
 
+    def suits(self, fit: TorqueFit) -> bool:
+        """Whether a fit under it leaves far less than before, and at no joint far more."""
+        falls = fit.misfit < _FALLS * self.before.misfit
+        return bool(falls and np.all(fit.unexplained <= _RISES * self.before.unexplained))
+
+    @property
+    def turn(self) -> float:
+        """Angle between the two, rad; infinite where one of them is none."""
+        if not (self.stated.any() and self.gravity.any()):
+            return np.inf
+        return _angle(self.stated, self.gravity)
+
     @property
     def fault(self) -> Fault:
         """The mounting in words, with the line of the study that mends it."""
         said = residuals(self.before, self.after)
-        an_axis = np.count_nonzero(self.gravity) == 1
-        is_what = "is" if an_axis else "is about"
-        what = f"gravity {is_what} {self.shown} in the axes of the description, not"
-        where = "Write in the study, above its tables, how the base is mounted"
-        if not an_axis:
-            where += "; until that is measured, with what the torques say"
         if not self.gravity.any():
-            what = "the torques hold no gravity, which was taken off before they were recorded:"
+            what = (
+                f"the torques hold no gravity, where the study says {_shown(self.stated)}: it was "
+                "taken off before they were recorded, is balanced, or pulls along the axes"
+            )
             where = "If so, write in the study, above its tables"
-        elif turn := self._turn_of_the_first_joint():
-            said += f" (a zero of q.{self.model.robot.names[0]} that is off by {turn} deg is alike)"
+        else:
+            an_axis = np.count_nonzero(self.gravity) == 1
+            what = (
+                f"gravity is {'' if an_axis else 'about '}{self.shown} in the axes of the "
+                f"description, not {_shown(self.stated)}"
+            )
+            where = "Write in the study, above its tables, how the base is mounted"
+            if not an_axis:
+                where += "; until that is measured, with what the torques say"
+            if turn := self._turn_of_the_first_joint():
+                joint = self.model.robot.names[0]
+                said += f" (a zero of q.{joint} that is off by {turn} deg is alike)"
         return Fault(
             kind="gravity",
             joints=(),
-            what=f"{what} {_shown(self.stated)}",
+            what=what,
             evidence=said,
             mend=(f"gravity = {self.shown}",),
             where=where,
@@ -89,9 +114,8 @@ class Mounting:
         joint, *others = self.model.robot.joints
         if joint.kind != "revolute" or any(one.parent == -1 for one in others):
             return 0
-        axis = joint.R @ joint.axis
-        old, new = (g / np.linalg.norm(g) for g in (self.stated, self.gravity))
-        if not abs(axis @ (new - old)) < _SAME_TURN:
+        axis, old, new = joint.R @ joint.axis, self.stated, self.gravity
+        if not old.any() or abs(axis @ (new - old)) > _PARALLEL * np.linalg.norm(old):
             return 0
         return abs(round(float(np.degrees(np.arctan2(axis @ np.cross(old, new), old @ new)))))
 
@@ -105,62 +129,98 @@ def mounting(
     ----------
     model : of which the robot, its gravity and the width of friction count.
     rows, now : the rows, and what belongs to which joint.
-    criteria : by how much it must win, and how far it must be turned: a base that is tilted by less
-        is a physical effect, which a diagnosis tells with its interval.
+    criteria : by how much it must win, and from which turn on a study has it wrong.
 
     Returns
     -------
-    None where no other gravity wins by far. Where several suit alike, an axis of the description,
-    the nearest to the stated gravity.
+    None where no other gravity wins by far. Where several suit alike, one that is turned by less
+    than that (a tilted base), or none, or an axis of the description, the nearest to the stated.
     """
     stated = model.robot.gravity
-    size = float(np.linalg.norm(stated)) or _EARTH
+    size = float(np.linalg.norm(stated)) or float(np.linalg.norm(GRAVITY))
     moved = rows.moved(now.change)
 
     def fit(gravity: np.ndarray) -> TorqueFit:
         under = replace(model, robot=model.robot.with_gravity(gravity))
         return WiringRegression.of(under, moved).fit(now.torque_of, now.torque_scale)
 
-    def turned(direction: np.ndarray) -> float:
-        return float(np.arccos(np.clip(direction @ stated / size, -1.0, 1.0)))
-
+    reference = stated if stated.any() else np.array(GRAVITY)
     start = fit(stated)
-    scores = [fit(size * one).score for one in _AROUND]
-    none = fit(np.zeros(3)).score
-    if max(*scores, none) <= start.score:
+    axis = _common_axis(model.robot)
+    directions = _AROUND if axis is None else _about(axis, reference)
+    scores = [fit(size * one).score for one in directions]
+    if max(*scores, fit(np.zeros(3)).score) <= start.score:
         return None
-    best = _refined(_AROUND[int(np.argmax(scores))], lambda one: fit(size * one).score)
-    axes = (one for one in sorted(_AXES, key=turned) if turned(one) >= criteria.least_turn)
-    tried = [(g, fit(g)) for g in (*(size * one for one in axes), np.zeros(3))]
-    refined = (np.round(size * best, 3), fit(size * best))  # as a study states it
-    alike = max(one.score for _, one in (*tried, refined)) - criteria.evidence / rows.independent
-    if turned(best) >= criteria.least_turn:
-        tried.append(refined)
-    suitable = [(g, one) for g, one in tried if one.score >= alike]
-    if not suitable:
-        return None
-    gravity, after = suitable[0]
+    best = directions[int(np.argmax(scores))]
+    near = [reference / size] if stated.any() else []
+    refined = [_refined(one, axis, lambda x: fit(size * x).score) for one in (*near, best)]
+    axes = [one for one in _AXES if any(np.allclose(one, each) for each in directions)]
+    small = [one for one in refined if near and _angle(one, reference) < criteria.least_turn]
+    large = [one for one in (*axes, *refined) if not any(one is each for each in small)]
+    large = [x for x in large if not near or _angle(x, reference) >= criteria.least_turn]
+    large.sort(key=lambda one: (not any(one is axis for axis in axes), _angle(one, reference)))
+    tried = [np.round(size * one, 3) for one in small]
+    tried += [np.zeros(3), *(np.round(size * one, 3) for one in large)]
+    fits = [fit(one) for one in tried]
+    alike = max(one.score for one in fits) - criteria.evidence / rows.independent
+    gravity, after = next(x for x in zip(tried, fits, strict=True) if x[1].score >= alike)
     found = Mounting(
         model=replace(model, robot=model.robot.with_gravity(gravity)),
         stated=stated,
         before=start,
         after=after,
     )
-    # What no fit leaves less of is not mended, whatever became possible by it.
-    better = after.misfit < start.misfit and is_better_by_far(after, start, rows, criteria)
-    return found if better else None
+    return found if mends(after, start, rows, criteria) else None
 
 
-def _refined(direction: np.ndarray, score: Callable[[np.ndarray], float]) -> np.ndarray:
-    """The direction of the highest score, from one that is near it; how near is judged by it."""
+def _common_axis(robot: Robot) -> np.ndarray | None:
+    """The axis (3,) about which all revolute joints turn, in the world; None where they differ."""
+    frames, axes = [], []
+    for joint in robot.joints:
+        frame = joint.R if joint.parent < 0 else frames[joint.parent] @ joint.R
+        frames.append(frame)
+        if joint.kind == "revolute":
+            axes.append(frame @ joint.axis)
+    if axes and all(np.linalg.norm(np.cross(axes[0], one)) < _PARALLEL for one in axes):
+        return axes[0]
+    return None
+
+
+def _about(axis: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Directions (3,) of a gravity that is turned about an axis."""
+    down = reference / np.linalg.norm(reference)
+    return tuple(turn_about(axis, turn) @ down for turn in _TURNS)
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> float:
+    """Angle between two directions, rad."""
+    cosine = one @ other / (np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _refined(
+    direction: np.ndarray, axis: np.ndarray | None, score: Callable[[np.ndarray], float]
+) -> np.ndarray:
+    """The direction of the highest score, from one that is near it; how near is judged by it.
+
+    Parameters
+    ----------
+    direction : (3,) where it begins.
+    axis : (3,) about which it turns; None for any.
+    score : of a direction.
+    """
     across = np.linalg.svd(direction[None])[2][1:]
 
     def at(turn: np.ndarray) -> np.ndarray:
+        if axis is not None:
+            return turn_about(axis, float(turn[0])) @ direction
         one = direction + turn @ across
         return one / np.linalg.norm(one)
 
-    options = {"initial_simplex": _SIMPLEX, "maxfev": _MOST_FITS, "xatol": 1e-3, "fatol": 1e-3}
-    found = minimize(lambda x: -score(at(x)), np.zeros(2), method="Nelder-Mead", options=options)
+    many = len(across) if axis is None else 1
+    simplex = np.vstack([np.zeros(many), _REACH * np.eye(many)])
+    options = {"initial_simplex": simplex, "maxfev": _MOST_FITS, "xatol": 1e-3, "fatol": 1e-3}
+    found = minimize(lambda x: -score(at(x)), np.zeros(many), method="Nelder-Mead", options=options)
     return at(found.x)
 
 

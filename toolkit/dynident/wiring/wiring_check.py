@@ -91,8 +91,11 @@ def _searched(
         if found is None:
             continue
         other = search(found.model, rows, criteria)
-        if is_better_by_far(other.fit, result.fit, rows, criteria):
-            return found.model, other, (found.fault,)
+        better = is_better_by_far(other.fit, result.fit, rows, criteria)
+        if better and found.suits(other.fit):
+            # A base that is tilted a little is no fault of the study, and columns none of it.
+            faults = (found.fault,) if found.turn >= criteria.least_turn else ()
+            return found.model, other, faults
     return model, result, ()
 
 

@@ -13,7 +13,7 @@ seldom makes them, nor a response that is linear in a smooth motion. There gaps 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -155,10 +155,7 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
     trained, judging = on_recordings(evidence, last.fitted), evidence.criteria.verdict
     if not last.fitted.noise_known:
-        names, units = model.robot.names, model.robot.torque_units
-        least = evidence.criteria.global_search.held_by_few
-        moving = beyond_reversals(trained, last.fitted.model, last.fitted.values)
-        bursts = bursts_in(moving, names, units, replace(judging, held_by_few=least))
+        bursts = _joints_with_bursts(last)
         every = [one for one in every if one.joint in bursts and one.nonlinear]
         return [one for one in every if one in last.fitted.model] or every
     if within_noise(trained, judging):
@@ -174,6 +171,36 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
         if is_felt and joint not in below_noise
     }
     return [one for one in every if one.joint in felt]
+
+
+def _joints_with_bursts(base: FittedModel) -> Collection[str]:
+    """Joints at which few rows hold much of what a model leaves, away from their reversals."""
+    model, criteria = base.fitted.model, base.evidence.criteria
+    least = replace(criteria.verdict, held_by_few=criteria.global_search.held_by_few)
+    trained = on_recordings(base.evidence, base.fitted)
+    moving = beyond_reversals(trained, model, base.fitted.values)
+    return bursts_in(moving, model.robot.names, model.robot.torque_units, least)
+
+
+def may_be_elsewhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> bool:
+    """Whether what a model leaves may come of wrong shapes of an effect that it has.
+
+    Parameters
+    ----------
+    evidence, fitted : the training recordings, and the model as it fits them.
+    effect : of the model.
+
+    Returns
+    -------
+    True where more than a known noise is left; where none is known, if there are bursts.
+    """
+    if not effect.sought_in(fitted.model.robot):
+        return False
+    if fitted.noise_known:
+        judged = on_recordings(evidence, fitted)
+        return not within_noise(judged, evidence.criteria.verdict)
+    bursts = _joints_with_bursts(FittedModel(evidence=evidence, fitted=fitted))
+    return effect.joint in bursts and effect.nonlinear
 
 
 def _felt(fitted: EvidenceFit) -> np.ndarray:

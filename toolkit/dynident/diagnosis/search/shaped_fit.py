@@ -7,11 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
-from dynident.diagnosis.search.global_search import best_anywhere
-from dynident.diagnosis.verdict import within_noise
+from dynident.diagnosis.search.global_search import best_anywhere, may_be_elsewhere
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_recordings
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 from dynident.model import Model
 
@@ -22,8 +20,8 @@ _OFF = (0.96, 1.04)
 def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
     """Fit a model as it was given, each shape parameter sought on its grid.
 
-    Where that leaves more than noise, those of many shapes are sought everywhere: a response with
-    play fits at the true ones and nowhere else, and the few of a grid may all lead astray.
+    Where that leaves more than a known noise, or bursts, those of many shapes are sought
+    everywhere: a response with play fits at the true ones alone, and a grid may lead astray.
     """
     fitted = fit_evidence(evidence, model)
     for effect in fitted.model.effects:
@@ -33,7 +31,7 @@ def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
             fitted = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
     fitted = refitted(evidence, fitted.model, fitted)
     for effect in fitted.model.effects:
-        if not effect.sought_in(model.robot) or _leaves_noise(evidence, fitted):
+        if not may_be_elsewhere(evidence, fitted, effect):
             continue
         others = fit_evidence(evidence, fitted.model - effect, fitted)
         better = best_anywhere(evidence, others, effect)
@@ -41,12 +39,6 @@ def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
             trial = refitted(evidence, fitted.model.with_shapes((better,)), fitted)
             fitted = min((fitted, trial), key=lambda one: one.misfit(others))
     return fitted
-
-
-def _leaves_noise(evidence: Evidence, fitted: EvidenceFit) -> bool:
-    """Whether a fit is known to leave nothing but noise."""
-    judged = on_recordings(evidence, fitted)
-    return fitted.noise_known and within_noise(judged, evidence.criteria.verdict)
 
 
 def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:

@@ -74,24 +74,21 @@ class LackOfFit:
     @property
     def headline(self) -> str:
         """What is to be read before any number; empty where nothing speaks against the model."""
-        if not self.rejected:
+        if not self.beyond_noise:
             return ""
+        said = self._at(self.beyond_steps if self.rejected else self.excess)
+        if not self.rejected:
+            return (
+                "What the repetitions of the motion have in common in the residual is no noise, "
+                f"{said}. The steps of the encoders, which repeat with it, may leave as much, or "
+                "the model lacks something: parameters may be off by more than sigma says. "
+                "`dynident explain` looks for what is missing."
+            )
         return (
             "The model is rejected by the repetitions of its motion: what they have in common in "
-            f"the residual is no noise, {self._at(self.beyond_steps)}. Parameters may be off by "
-            "more than sigma says. What is missing, or whether dry friction only reverses over "
-            "another width than is stated, `dynident explain` tells."
-        )
-
-    @property
-    def note(self) -> str:
-        """That steps of encoders may be all that repetitions have in common; empty where not."""
-        if self.rejected or not self.beyond_noise:
-            return ""
-        return (
-            "What the repetitions of the motion have in common in the residual is no noise, "
-            f"{self._at(self.excess)}, and no more than the steps of the encoders may leave, which "
-            "repeat with the motion. What is smaller than that cannot be told from them."
+            f"the residual is no noise, {said}. Parameters may be off by more than sigma says. "
+            "What is missing, or whether dry friction only reverses over another width than is "
+            "stated, `dynident explain` tells."
         )
 
     def _at(self, excess: np.ndarray) -> str:
@@ -125,7 +122,7 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     """
     if not any(recording.period for recording in dataset.recordings):
         return None
-    passes = over_recordings(dataset.recordings, _of_recording, model, dataset.filter, values)
+    passes = [*over_recordings(dataset.recordings, _of_recording, model, dataset.filter, values)]
     found = [one for one in passes if one is not None]
     if not found:
         return None
@@ -142,7 +139,8 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     )
     if not judged.beyond_noise:
         return judged
-    periodic = tuple(one for one in dataset.recordings if one.period)
+    pairs = zip(dataset.recordings, passes, strict=True)
+    periodic = tuple(recording for recording, one in pairs if one is not None)
     counting = [(one.t, one.counting) for one in (sample(r, dataset.filter) for r in periodic)]
     repeated = replace(dataset, recordings=periodic)
     power = rounding_power(model, values, repeated, judged=counting)

@@ -24,7 +24,6 @@ from dynident.study_draft.guesses.wiring_guess import guess_wiring
 from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
 from dynident.wiring.assignment import Assignment
-from dynident.wiring.hypothesis_search import is_better_by_far
 from dynident.wiring.mounting import mounting
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
@@ -98,13 +97,13 @@ def amended(
 
 
 def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
-    """A base on the ceiling or on a wall."""
+    """A base that is mounted otherwise than the description says, or torques without gravity."""
     rows = reading.rows(recordings)
     if rows is None:
         return None
     robot = reading.robot
     found = mounting(Model(robot), rows, Assignment.as_recorded(robot.n), DEFAULTS.wiring)
-    if found is None:
+    if found is None or found.turn < DEFAULTS.wiring.least_turn or not found.suits(found.after):
         return None
     return Amendment(
         subject="gravity",
@@ -220,23 +219,6 @@ def _fit(robot: Robot, rows: WiringRows) -> TorqueFit:
     """Fit the robot's equations of motion to rows, as they are."""
     n = robot.n
     return WiringRegression.of(Model(robot), rows).fit(np.arange(n), np.ones(n))
-
-
-def wins(best: TorqueFit, start: TorqueFit, rows: WiringRows) -> bool:
-    """Whether a fit is better by far, by the criteria of the wiring check.
-
-    Parameters
-    ----------
-    best, start : the fits.
-    rows : of which they are.
-
-    Returns
-    -------
-    True if it is.
-    """
-    # What no fit leaves less of is not mended, whatever became possible by it.
-    better = best.misfit < start.misfit
-    return better and is_better_by_far(best, start, rows, DEFAULTS.wiring)
 
 
 def evidence(start: TorqueFit, best: TorqueFit) -> str:
