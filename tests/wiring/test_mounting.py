@@ -91,7 +91,8 @@ def turntable(gravity: tuple[float, ...]) -> di.Model:
         '<mass value="20"/><origin xyz="0.2 0.05 0"/>'
         '<inertia ixx="0.1" iyy="0.1" izz="0.5" ixy="0" ixz="0" iyz="0"/></inertial></link>'
         '<joint name="turn" type="revolute"><axis xyz="0 0 1"/><parent link="base"/>'
-        '<child link="table"/><limit lower="-3" upper="3" velocity="9" effort="99"/></joint></robot>'
+        '<child link="table"/><limit lower="-3" upper="3" velocity="9" effort="99"/></joint>'
+        "</robot>"
     )
     robot = di.Robot.from_text(text).with_gravity(gravity)
     return di.Model(robot) + "viscous_friction"
