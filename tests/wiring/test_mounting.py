@@ -125,10 +125,12 @@ def test_a_planar_arm_without_gravity_is_not_said_to_lie_on_its_side() -> None:
     assert "balanced" in found[0].what
 
 
-def test_a_planar_arm_may_have_its_first_zero_elsewhere() -> None:
+@pytest.mark.parametrize("joints", [["shoulder", "elbow"], ["elbow", "shoulder"]])
+def test_a_planar_arm_may_have_its_first_zero_elsewhere(joints: list[str]) -> None:
     """Both joints turn about y: gravity along -x is a quarter turn of the first."""
-    upright = di.Model(arm()) + "viscous_friction"
-    on_its_side = replace(upright, robot=arm().with_gravity((-9.81, 0.0, 0.0)))
+    robot = di.Robot.from_text(arm().description.text, joints=joints)  # type: ignore[union-attr]
+    upright = di.Model(robot) + "viscous_friction"
+    on_its_side = replace(upright, robot=robot.with_gravity((-9.81, 0.0, 0.0)))
     recording = synthetic(on_its_side, true_values(on_its_side), 0, torque_std=0.05)
     (fault,) = check_wiring(upright, Dataset((recording,)))
     assert fault.kind == "gravity"

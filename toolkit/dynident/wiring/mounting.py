@@ -20,7 +20,7 @@ from dynident.criteria import WiringCriteria
 from dynident.effects.bodies.turn import turn_about
 from dynident.model import Model
 from dynident.robot import Robot
-from dynident.robot.tree import GRAVITY
+from dynident.robot.tree import GRAVITY, Joint
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault import Fault
 from dynident.wiring.fault_words import residuals
@@ -98,7 +98,7 @@ class Mounting:
             if not an_axis:
                 where += "; until that is measured, with what the torques say"
             if turn := self._turn_of_the_first_joint():
-                joint = self.model.robot.names[0]
+                (joint,) = (one.name for one in self.model.robot.joints if one.parent < 0)
                 said += f" (a zero of q.{joint} that is off by {turn} deg is alike)"
         return Fault(
             kind="gravity",
@@ -111,9 +111,10 @@ class Mounting:
 
     def _turn_of_the_first_joint(self) -> int:
         """Degrees by which a zero of the first joint would do the same; 0 if none does."""
-        joint, *others = self.model.robot.joints
-        if joint.kind != "revolute" or any(one.parent == -1 for one in others):
+        roots = [one for one in self.model.robot.joints if one.parent < 0]
+        if len(roots) > 1 or roots[0].kind != "revolute":
             return 0
+        (joint,) = roots
         axis, old, new = joint.R @ joint.axis, self.stated, self.gravity
         if not old.any() or abs(axis @ (new - old)) > _PARALLEL * np.linalg.norm(old):
             return 0
@@ -175,12 +176,11 @@ def mounting(
 
 def _common_axis(robot: Robot) -> np.ndarray | None:
     """The axis (3,) about which all revolute joints turn, in the world; None where they differ."""
-    frames, axes = [], []
-    for joint in robot.joints:
-        frame = joint.R if joint.parent < 0 else frames[joint.parent] @ joint.R
-        frames.append(frame)
-        if joint.kind == "revolute":
-            axes.append(frame @ joint.axis)
+
+    def frame(joint: Joint) -> np.ndarray:
+        return joint.R if joint.parent < 0 else frame(robot.joints[joint.parent]) @ joint.R
+
+    axes = [frame(one) @ one.axis for one in robot.joints if one.kind == "revolute"]
     if axes and all(np.linalg.norm(np.cross(axes[0], one)) < _PARALLEL for one in axes):
         return axes[0]
     return None
