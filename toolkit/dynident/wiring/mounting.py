@@ -36,8 +36,9 @@ _TURNS = tuple(np.deg2rad(range(0, 360, 15)))  # about parallel axes
 _REACH = 0.2  # rad, of the first steps of a refinement
 _MOST_FITS = 60  # of a refinement: 0.01 rad and better
 _PARALLEL = 0.02  # rad between axes that count as one
-_FALLS = 0.7  # of the torque that is left, to which another gravity must bring it
-_RISES = 4.0  # of a joint's squared residual, beyond which another gravity does not suit it
+_FALLS, _RISES = 0.5, 2.0
+"""Times a joint's squared residual that another gravity must leave somewhere, and nowhere: springs
+that balance more than the weight make it leave half at best, or more at other joints."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,9 +68,9 @@ class Mounting:
         return _shown(self.gravity)
 
     def suits(self, fit: TorqueFit) -> bool:
-        """Whether a fit under it leaves far less than before, and at no joint far more."""
-        falls = fit.misfit < _FALLS * self.before.misfit
-        return bool(falls and np.all(fit.unexplained <= _RISES * self.before.unexplained))
+        """Whether a fit under it leaves far less than before at a joint, and far more at none."""
+        ratio = fit.unexplained / np.maximum(self.before.unexplained, np.finfo(float).tiny)
+        return bool(ratio.min() < _FALLS and ratio.max() < _RISES)
 
     @property
     def turn(self) -> float:
