@@ -8,20 +8,38 @@ from functools import cache
 import numpy as np
 import pytest
 
+from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments, score
-from dynident.effects import Effect, catalogue
+from dynident.effects import Effect, catalogue, effects_of
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
-from dynident.evidence.time_varying import time_varying_variants
+from dynident.evidence.time_varying import steady, time_varying_variants
 from dynident.model import Model
 from dynident.recording import Dataset
 from study_files import recording, true_model
+from synthetic import synthetic, true_values
 
 
 @cache
 def fitted(seed: int) -> tuple[Evidence, EvidenceFit]:
     evidence = Evidence(true_model(), gather(Dataset((recording(seed),))))
+    return evidence, fit_evidence(evidence, evidence.model)
+
+
+def warmed(hidden: Effect) -> tuple[Evidence, EvidenceFit]:
+    """Six repetitions in which the shoulder warms up, and the model without that."""
+    model = true_model() + hidden
+    known = {"Fv__shoulder": 1.2, "Fv__elbow": 1.0, "Fc__elbow": 1.5, "Fvt__shoulder": 0.8}
+    made = synthetic(
+        model,
+        true_values(model, **known),
+        duration=48.0,
+        rate_hz=100.0,
+        position_std=1e-5,
+        torque_std=0.05,
+    )
+    evidence = Evidence(true_model(), gather(Dataset((made,))))
     return evidence, fit_evidence(evidence, evidence.model)
 
 
@@ -31,10 +49,13 @@ def at_shoulder(name: str, model: Model) -> Effect:
 
 
 @pytest.mark.parametrize("unknown", [(), (90, 91, 97, 150)])
-def test_a_ramp_is_its_own_instrument_under_noise_of_any_colour(unknown: tuple[int, ...]) -> None:
-    """Whatever the motion, the next repetition's ramp at this one's time is this one's ramp.
+def test_what_the_time_leaves_as_it_is_has_the_instrument_of_any_column(
+    unknown: tuple[int, ...],
+) -> None:
+    """That of the next repetition, as viscous friction has it, under noise of any colour.
 
-    Also after rows whose dry friction nothing tells.
+    Else a change that is far slower than the session would explain the difference of the two. Also
+    after rows whose dry friction nothing tells.
     """
     evidence, found = fitted(0)
     assert len(found.noise[0].colour) > 1
@@ -42,12 +63,39 @@ def test_a_ramp_is_its_own_instrument_under_noise_of_any_colour(unknown: tuple[i
     uncertain = ~run.certain_rows
     uncertain[list(unknown), 0] = True
     evidence = evidence.with_runs((replace(run, uncertain=uncertain),))
-    ramp = at_shoulder("torque_drift", evidence.model)
-    columns = evidence.of(ramp, 0, evidence.model, None)[0][:, 0]
+    slow = at_shoulder("thermal_friction", evidence.model).shaped(1e5)
+    columns = evidence.of(slow, 0, evidence.model, None)[0][:, 0]
     (stack,) = evidence.stacks
     white = stack.unfolded(stack.whitened([[[columns]]], 0, found.noise[0]))
-    made = time_varying_variants(evidence, [ramp], stack, 0, found.noise[0], ([[columns]], white))
-    np.testing.assert_allclose(made.instruments, white, rtol=1e-6)
+    made = time_varying_variants(evidence, [slow], stack, 0, found.noise[0], ([[columns]], white))
+    change = run.recording.duration / 1e5
+    np.testing.assert_allclose(made.instruments, steady(white).instruments, rtol=2.0 * change)
+
+
+@pytest.mark.parametrize("warm", [20.0, 60.0])
+def test_changes_far_slower_than_the_session_are_one_ramp(warm: float) -> None:
+    """Six repetitions in which viscous friction falls, which is noise to products of them all."""
+    hidden = at_shoulder("thermal_friction", true_model()).shaped(warm)
+    evidence, found = warmed(hidden)
+    asked = at_shoulder("thermal_friction", evidence.model)
+    shapes = [asked.shaped(T) for T in (warm, 300.0, 1000.0, 3000.0)]
+    moments = candidate_moments(evidence, found, shapes)
+    true, *slow = (score(found, e, *m, 1).drop for e, m in zip(shapes, moments, strict=True))
+    assert true > 10.0 * np.log(found.rows)
+    assert np.ptp(slow) < 0.02 * true
+    assert max(slow) < 1.1 * true
+    (best,) = rank(evidence, found, 0, only=(asked,)).passing
+    assert warm / 5.0 < best.effect.shape[0] < 5.0 * warm
+    # Beside it nothing is left, of the torque's own scale neither.
+    wider = fit_evidence(evidence, found.model + hidden, found)
+    value, sigma = (
+        float(one[wider.model.slices[hidden.label]][0])
+        for one in (wider.values, np.sqrt(np.diag(wider.covariance)))
+    )
+    assert abs(value - 0.8) < 4.0 * sigma < 0.2
+    (gain,) = effects_of("drive_gain@shoulder", evidence.model.robot)
+    ((beside, own),) = candidate_moments(evidence, wider, [gain])
+    assert abs(score(wider, gain, beside, own, 1).drop) < 0.02 * true
 
 
 @pytest.mark.parametrize("seed", [0, 1001, 1017, 1041])

@@ -106,15 +106,13 @@ def test_what_has_no_known_noise_counts_as_signal_beside_what_has() -> None:
     np.testing.assert_allclose(beside.signal[4:], bare.total)
 
 
-def test_selections_weights_and_masks_go_through_both_kinds_of_products() -> None:
+def test_selections_weights_and_other_signals_go_through_both_kinds_of_products() -> None:
     one = blocks_of_time(2)
     part = one.among(np.array([0, 2]))
     np.testing.assert_allclose(part.signal, one.signal[:, [0, 2]][:, :, [0, 2]])
     np.testing.assert_allclose(one.columns(slice(1, 2)).total, one.total[:, :, 1:2])
     half = one.weighted(np.array([1.0, 0.0, 1.0, 0.0]))
     np.testing.assert_allclose(half.pooled().signal, one.signal[::2].sum(axis=0))
-    mask = np.eye(3, dtype=bool)
-    other = one.where(mask, np.zeros_like(one.total))
-    np.testing.assert_allclose(other.signal[:, mask], 0.0)
-    np.testing.assert_allclose(other.signal[:, ~mask], one.signal[:, ~mask])
+    other = one.with_signal(2.0 * one.signal)
+    np.testing.assert_allclose(other.pooled().signal, 2.0 * one.pooled().signal)
     assert other.total is one.total

@@ -90,6 +90,8 @@ class Answer:
         of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
     bursts : joints at which a few instants, not those of their reversals, hold most of what is left
         of the training recordings.
+    drifting : joints whose repetitions differ the more, the longer they lie apart: what changes
+        from one to the next is measured as noise.
     friction_widths : of every joint, rad/s or m/s, where fits need others than the model's: both
         models were fitted with those.
     sampled : when the torque acts, where that is not when the study says.
@@ -127,6 +129,7 @@ class Answer:
     training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
     bursts: tuple[str, ...] = ()
+    drifting: tuple[str, ...] = ()
     friction_widths: Mapping[str, float] = field(default_factory=dict)
     sampled: SamplingTime | None = None
     too_fast: OverSpeed | None = None
@@ -377,6 +380,7 @@ class Answer:
             or self.only_withdrawn
             or self.too_fast is not None
             or self.reversals_left_out  # of these rows nothing is claimed
+            or self.drifting  # nor of what is smaller than that
             or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
         ):
             return None

@@ -26,6 +26,7 @@ from dynident.diagnosis.details import (
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
+from dynident.diagnosis.nuisances.drifting_noise import Drift, drift_notes, drifts_in
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.sampling_time import sampling_time
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
@@ -50,6 +51,7 @@ from dynident.evidence.evidence_estimate import estimate_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
+from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.model import Model
 from dynident.recording import Dataset, RowCount
@@ -111,11 +113,9 @@ def assemble(
     bursts = bursts_in(beyond_reversals(trained, last.model, last.values), names, units, judging)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], judging, bursts)
     final = estimate_of(evidence, last, train)
-    impossible = ()
-    if verdict != "unexplained":
-        impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
-        verdict = "unexplained" if impossible else verdict
-    widths = found_widths(evidence, last)
+    impossible = _impossible(verdict, evidence, final)
+    verdict = "unexplained" if impossible else verdict
+    widths, drifts = found_widths(evidence, last), drifts_in(evidence, last)
     # Where a law is missing, a delay may be no more than a part of it.
     most_of_it = judging.most_explained if verdict == "unexplained" else 0.0
     pushed = contact_candidates(given, evidence, search.disturbances)
@@ -138,7 +138,7 @@ def assemble(
             *notes_on(evidence, held, last, source, search.doubtful),
             *widths.notes,
             *_differing_recordings(trained, after, evidence, held, last),
-            *_noise_doubts(evidence, source, rounded, after),
+            *_noise_doubts(evidence, source, rounded, after, drifts),
             *burst_notes(bursts_in(trained, names, units, judging), bursts),
             *rounding_notes(after, given.robot.names, judging),
             *notes_on_steps(steps, held),
@@ -156,10 +156,18 @@ def assemble(
         sampled=sampling_time(evidence, last, rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
         bursts=tuple(bursts),
+        drifting=tuple(one.joint for one in drifts),
         friction_widths=widths.to_state,
         reversals_left_out=_shares(search, search.doubtful),
         stops_left_out=_shares(search, set(given.robot.names) - set(search.doubtful)),
     )
+
+
+def _impossible(verdict: Verdict, evidence: Evidence, final: Estimate) -> tuple[str, ...]:
+    """What no robot can have, where the verdict would be that the model is complete."""
+    if verdict == "unexplained":
+        return ()
+    return impossible_joints_of(evidence, final.model, final.values, final.covariance)
 
 
 def _limits(
@@ -234,11 +242,15 @@ def _training_only(
 
 
 def _noise_doubts(
-    evidence: Evidence, source: NoiseSource, recordings: Dataset, after: HeldOut
+    evidence: Evidence,
+    source: NoiseSource,
+    recordings: Dataset,
+    after: HeldOut,
+    drifts: tuple[Drift, ...],
 ) -> tuple[str, ...]:
-    """Hold a stated noise, where it is the floor, against the recordings that were judged."""
+    """Say what drifts in it; hold it, where it is stated, against the recordings judged by it."""
     if source != "given":
-        return ()
+        return drift_notes(drifts)
     units = evidence.model.robot.torque_units
     return stated_noise_notes(after, recordings, units, evidence.criteria.verdict.most_left)
 

@@ -38,6 +38,7 @@ class Diagnosis(Answer, Shown):
             following_motion=(),
             training_only=(),
             bursts=(),
+            drifting=(),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -49,6 +50,7 @@ class Diagnosis(Answer, Shown):
             **({"training_only": list(self.training_only)} if self.training_only else {}),
             **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
             **({"bursts": list(self.bursts)} if self.bursts else {}),
+            **({"drifting": list(self.drifting)} if self.drifting else {}),
             **({"friction_widths": dict(self.friction_widths)} if self.friction_widths else {}),
             "joints": [
                 {

@@ -11,16 +11,17 @@ import numpy as np
 from scipy.linalg import null_space
 
 from dynident.criteria import Criteria
+from dynident.effects import Effect
 from dynident.evidence.columns.joint_columns import JointColumns, WhiteColumns
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import NoiseModel, flat_noise
 from dynident.evidence.runs import Run
-from dynident.evidence.time_varying import time_varying_columns, time_varying_mask
+from dynident.evidence.time_varying import steady, time_varying_columns
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicates import time_varying_products
+from dynident.moments.replicates import TimeVarying, time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import (
     MomentSolution,
@@ -109,6 +110,43 @@ class EvidenceFit:
         least = self.criteria.noise.reliable
         each = self.moments.without_each()
         return np.array([regression_values(others, least) for others in each])
+
+    def beside(self, effect: Effect) -> EvidenceFit:
+        """Return the fit with the moments that the columns of an effect are to be compared with.
+
+        Parameters
+        ----------
+        effect : that the model may lack.
+
+        Returns
+        -------
+        As it is, but for an effect that depends on the time, where a motion repeats.
+        """
+        return self._in_session if effect.time_varying else self
+
+    @cached_property
+    def _in_session(self) -> EvidenceFit:
+        """The fit with the next repetition as the instrument of each."""
+        repeats = any(joints[0].stack.kind == "repeated" for joints in self.white)
+        if self.model.is_time_varying or not repeats:
+            return self
+        found = []
+        for joints in self.white:
+            apart = joints if joints[0].stack.kind == "repeated" else ()
+            found.append(_with_next(joints, [steady(one.dense()) for one in apart]))
+        summed = SecondMoments.stacked(found)
+        pooled = summed.pooled()
+        solution = regress(pooled, self.criteria.noise.reliable)
+        values = _near_description(self.model, solution.values, pooled)
+        combination = np.append(-values, 1.0)
+        return replace(
+            self,
+            values=values,
+            covariance=solution.covariance,
+            solution=solution,
+            moments=summed,
+            error_signal=float(combination @ pooled.signal @ combination),
+        )
 
     @cached_property
     def error_total(self) -> float:
@@ -391,24 +429,44 @@ def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Seq
 
 
 def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
-    found, time_varying = [], time_varying_mask(model)
-    for stack, joints in zip(evidence.stacks, white, strict=True):
-        here = WhiteColumns.moments(joints)
-        if stack.kind == "repeated" and time_varying.any():
-            own = [
-                time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
-                for j, w in enumerate(joints)
-            ]
-            edges = stack.runs[0].edges
-            other = np.sum([time_varying_products(one, one, edges) for one in own], axis=0)
-            here = here.where(time_varying[:, None] | time_varying[None, :], other)
-        found.append(here)
-    return SecondMoments.stacked(found)
+    if model.is_time_varying:
+        return _of_the_session(evidence, model, noise, white)
+    return SecondMoments.stacked([WhiteColumns.moments(joints) for joints in white])
+
+
+def _of_the_session(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
+    """Moments of a model of which some columns depend on the time, see `_with_next`."""
+    return SecondMoments.stacked(
+        [
+            _with_next(
+                joints,
+                [
+                    time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
+                    for j, w in enumerate(joints)
+                ]
+                if stack.kind == "repeated"
+                else (),
+            )
+            for stack, joints in zip(evidence.stacks, white, strict=True)
+        ]
+    )
+
+
+def _with_next(joints: Sequence[WhiteColumns], own: Sequence[TimeVarying]) -> SecondMoments:
+    """Moments with the next repetition as the instrument of each; of other recordings, as ever.
+
+    Products of all repetitions tell the same in the mean. But of a column that hardly changes with
+    the time, beside its like that does not, the difference of two estimates would be all there is.
+    """
+    found, edges = WhiteColumns.moments(joints), joints[0].stack.runs[0].edges
+    if not own:
+        return found
+    return found.with_signal(np.sum([time_varying_products(x, x, edges) for x in own], axis=0))
 
 
 def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
     """The moments of all blocks together, in less time where nothing depends on the time."""
-    if time_varying_mask(model).any():
+    if model.is_time_varying:
         return _moments(evidence, model, noise, white).pooled()
     return reduce(add, (WhiteColumns.pooled(joints) for joints in white))
 

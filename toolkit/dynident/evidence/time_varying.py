@@ -22,12 +22,10 @@ _NOTHING = 1e-12
 """Part of its largest value below which a factor of the time is zero."""
 
 
-def time_varying_mask(model: Model) -> np.ndarray:
-    """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
-    mask = np.zeros(model.size + 1, dtype=bool)
-    for effect in model.effects:
-        mask[model.slices[effect.label]] = effect.time_varying
-    return mask
+def steady(white: np.ndarray) -> TimeVarying:
+    """Columns and the torque after them, (R, P, S, p + 1), of which none depends on the time."""
+    instruments = np.roll(white, -1, axis=1)
+    return TimeVarying(white, instruments, np.arange(white.shape[3]) == white.shape[3] - 1)
 
 
 def time_varying_columns(
@@ -46,15 +44,15 @@ def time_varying_columns(
     -------
     The columns, and what the next repetition has in their place.
     """
-    instruments = np.roll(white, -1, axis=1)
+    found = steady(white)
     for effect in model.effects:
         joints = effect.acting_at(model.robot)
         if effect.time_varying and joint in joints:
-            for r, found in zip(stack.numbers, instruments, strict=True):
+            for r, instruments in zip(stack.numbers, found.instruments, strict=True):
                 measured = evidence.of(effect, r, model, None)[0][:, joints.index(joint)]
                 moved = _at_this_time(evidence, effect, r, joint, noise, measured)
-                found[..., model.slices[effect.label]] = moved
-    return TimeVarying(white, instruments, np.arange(white.shape[3]) == model.size)
+                instruments[..., model.slices[effect.label]] = moved
+    return found
 
 
 def time_varying_variants(
@@ -91,6 +89,24 @@ def time_varying_variants(
     return TimeVarying(white, instruments, np.zeros(white.shape[3], dtype=bool))
 
 
+def of_the_torque(new: TimeVarying, model: TimeVarying, values: np.ndarray) -> TimeVarying:
+    """Columns in proportion to the predicted torque, which the time changes where it changes that.
+
+    Parameters
+    ----------
+    new : the columns, (R, P, S, k).
+    model, values : columns of the model and the torque, and the (p,) parameters that predict.
+
+    Returns
+    -------
+    With the torque that is predicted of the next repetition's motion at the time of this one.
+    """
+    here, there = (one[..., :-1] @ values for one in (model.columns, model.instruments))
+    power = max(float(np.sum(here**2)), np.finfo(float).tiny)
+    factors = np.einsum("rpsk,rps->k", new.columns, here) / power
+    return TimeVarying(new.columns, there[..., None] * factors, new.is_torque)
+
+
 def _at_this_time(
     evidence: Evidence,
     effect: Effect,
@@ -104,12 +120,11 @@ def _at_this_time(
     speed = recorded.replicates[0].v[:, joint]
     factor = effect.time_factor(recorded.rows(model=evidence.model))
     sound = np.abs(factor) > _NOTHING * np.abs(factor).max()
-    found = []
+    rows, found = np.arange(len(columns)), []
     for here, there in zip(recorded.index, np.roll(recorded.index, -1, axis=0), strict=True):
         # Whole rows, since whitening looks back; those of no use are out of the repetition.
-        rows = np.arange(len(columns))
-        after = np.clip(rows + there[0] - here[0], 0, len(columns) - 1)
-        ratio = np.where(sound[after], factor / np.where(sound[after], factor[after], 1.0), 1.0)
-        moved = columns[after] * ratio[:, None]
-        found.append(noise.whiten(moved, speed, recorded.told(joint))[here])
+        now = factor[np.clip(rows + here[0] - there[0], 0, len(columns) - 1)]
+        ratio = np.where(sound, now / np.where(sound, factor, 1.0), 1.0)
+        white = noise.whiten(columns * ratio[:, None], speed, recorded.told(joint))
+        found.append(white[there])
     return np.stack(found)

@@ -276,6 +276,11 @@ class ParametrisedRobot:
         """Whether some columns depend on the parameters: they are taken at values, and again."""
         return any(e.nonlinear or e.depends_on_fit for e in self.effects)
 
+    @property
+    def is_time_varying(self) -> bool:
+        """Whether some columns depend on the time in the session: no repetition equals another."""
+        return any(e.time_varying for e in self.effects)
+
     def linearisation_point(self) -> np.ndarray:
         """Values at which columns that are not linear in them are taken, all others zero, (p,)."""
         values = np.zeros(self.size)

@@ -173,9 +173,9 @@ class SecondMoments:
             left = None if free is None else whole.signal - free[block]
             yield SecondMoments(total, whole.count - int(count), None, left)
 
-    def where(self, chosen: np.ndarray, signal: np.ndarray) -> SecondMoments:
-        """Take other products for those free of noise (..., a, b) where a mask (a, b) says so."""
-        return replace(self, noise_free=np.where(chosen, signal, self.signal))
+    def with_signal(self, signal: np.ndarray) -> SecondMoments:
+        """Take other products (..., a, b) for those free of noise."""
+        return replace(self, noise_free=signal)
 
     def weighted(self, weights: np.ndarray) -> SecondMoments:
         """Return the moments with each block's products times its weight, (B,)."""

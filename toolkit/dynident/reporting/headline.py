@@ -60,26 +60,30 @@ def headline(diagnosis: Diagnosis) -> Headline:
         return _with_doubt(Headline("!", "impossible values", said), diagnosis)
     found = _with_doubt(_of_verdict(diagnosis), diagnosis)
     if diagnosis.sampled is not None:
-        mark = "?" if found.mark == "\u2713" else found.mark
-        said = f"{found.sentence} The torque is of another moment than the study says."
-        found = replace(found, mark=mark, sentence=said)
+        found = _doubted(found, "The torque is of another moment than the study says.")
     if diagnosis.reversals_left_out:
-        mark = "?" if found.mark == "\u2713" else found.mark
         where = listed(list(diagnosis.reversals_left_out))
-        said = f"{found.sentence} The reversals of {where} are left out: see the notes."
-        found = Headline(mark, found.title, said)
+        found = _doubted(found, f"The reversals of {where} are left out: see the notes.")
     if diagnosis.not_judged_in_words:
         said = " ".join([found.sentence, *diagnosis.not_judged_in_words])
         found = replace(found, sentence=said)
     if diagnosis.bursts:
-        mark = "?" if found.mark == "\u2713" else found.mark
         where = listed(list(diagnosis.bursts))
-        said = f"{found.sentence} At {where} a few bursts hold most of what is left: see the notes."
-        found = Headline(mark, found.title, said)
+        said = f"At {where} a few bursts hold most of what is left: see the notes."
+        found = _doubted(found, said)
+    if diagnosis.drifting:
+        where = listed(list(diagnosis.drifting))
+        found = _doubted(found, f"What drifts at {where} counts as noise: see the notes.")
     if diagnosis.limit is None:
         return found
     said = f"{found.sentence} {diagnosis.limit_in_words}."
     return Headline(found.mark, found.title, said)
+
+
+def _doubted(found: Headline, said: str) -> Headline:
+    """A headline with a sentence more, that nobody takes for a clean bill of health."""
+    mark = "?" if found.mark == "\u2713" else found.mark
+    return replace(found, mark=mark, sentence=f"{found.sentence} {said}")
 
 
 def _with_doubt(found: Headline, diagnosis: Diagnosis) -> Headline:

@@ -157,12 +157,14 @@ def mounting(
     near = [reference / size] if stated.any() else []
     refined = [_refined(one, axis, lambda x: fit(size * x).score) for one in (*near, best)]
     axes = [one for one in _AXES if any(np.allclose(one, each) for each in directions)]
-    small = [one for one in refined if near and _angle(one, reference) < criteria.least_turn]
-    large = [one for one in (*axes, *refined) if not any(one is each for each in small)]
-    large = [x for x in large if not near or _angle(x, reference) >= criteria.least_turn]
-    large.sort(key=lambda one: (not any(one is axis for axis in axes), _angle(one, reference)))
-    tried = [np.round(size * one, 3) for one in small]
-    tried += [np.zeros(3), *(np.round(size * one, 3) for one in large)]
+
+    def turn(one: np.ndarray) -> float:
+        return _angle(one, reference)
+
+    tilted = [one for one in refined if near and turn(one) < criteria.least_turn]
+    nearest = [x for some in (axes, refined) for x in sorted(some, key=turn)]
+    turned = [one for one in nearest if not near or turn(one) >= criteria.least_turn]
+    tried = [np.round(size * one, 3) for one in (*tilted, np.zeros(3), *turned)]
     fits = [fit(one) for one in tried]
     alike = max(one.score for one in fits) - criteria.evidence / rows.independent
     gravity, after = next(x for x in zip(tried, fits, strict=True) if x[1].score >= alike)

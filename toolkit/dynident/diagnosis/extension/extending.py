@@ -61,6 +61,27 @@ def extend(stage: Stage, task: DiagnosisTask) -> Stage:
     task : what is asked; how many effects may be added, among others.
     """
     while stage.proposals < task.most:
+        many = len(stage.found)
+        stage = with_one_more(stage, task)
+        if len(stage.found) == many:
+            break
+        stage = rank_stage(stage, task)
+    return stage
+
+
+def with_one_more(stage: Stage, task: DiagnosisTask) -> Stage:
+    """Add the best effect that stands every test, and refit; nothing where none does.
+
+    Parameters
+    ----------
+    stage : the model with its latest ranking.
+    task : what is asked.
+
+    Returns
+    -------
+    The model with its effect, not ranked again; or with a ranking that says why there is none.
+    """
+    while True:
         if why := _resolved(stage, task):
             every = [one.effect.label for one in stage.rounds[-1].passing]
             return _refusing(stage, dict.fromkeys(every, why))
@@ -69,7 +90,7 @@ def extend(stage: Stage, task: DiagnosisTask) -> Stage:
             laws = laws_of_the_rest(stage.evidence, stage.fitted)
             doubtful = without_their_reversals(stage, laws, "")
             if doubtful is stage:
-                break
+                return stage
             stage = rank_stage(doubtful, task)
             continue
         label, many = best.score.effect.label, len(stage.found)
@@ -84,9 +105,10 @@ def extend(stage: Stage, task: DiagnosisTask) -> Stage:
             noted = replace(stage, notes=(*earlier, f"{why}."))
             stage = _refusing(noted, {label: why})
             continue
-        wider, why = _tried(stage, best, task)
-        stage = _refusing(stage, {label: why}) if why else rank_stage(wider, task)
-    return stage
+        wider, why = tried(stage, best, task)
+        if not why:
+            return wider
+        stage = _refusing(stage, {label: why})
 
 
 def _refusing(stage: Stage, reasons: Mapping[str, str]) -> Stage:
@@ -95,8 +117,19 @@ def _refusing(stage: Stage, reasons: Mapping[str, str]) -> Stage:
     return replace(stage, rounds=(*stage.rounds[:-1], ranking))
 
 
-def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
-    """Return the model with one effect more, and why it is refused; that is empty if it is not."""
+def tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
+    """Return the model with one effect more, and why it is refused; that is empty if it is not.
+
+    Parameters
+    ----------
+    stage : the model with its latest ranking.
+    best : the effect.
+    task : what is asked.
+
+    Returns
+    -------
+    The model, all of it fitted anew and not ranked again, and the reason in words.
+    """
     added = _add_and_refit(stage, best, task)
     if why := breaks_its_promise(stage.fitted, added.fitted, best.score):
         return added, why

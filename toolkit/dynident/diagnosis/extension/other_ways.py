@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
-from dynident.diagnosis.extension.extending import extend, rank_stage
+from dynident.diagnosis.extension.extending import extend, rank_stage, tried, with_one_more
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.selection import AddedEffect, choose
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -46,10 +48,7 @@ def _searched_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> St
     missed = global_search(first.ranked, extended.ranked, task.progress)
     if missed is None:
         return extended
-    base = extended
-    if missed.fitted is not extended.fitted:
-        # What was kept of the first ranking belongs to the other branch.
-        base = replace(first, evidence=start.evidence.looked_at_anew())
+    base = extended if missed.fitted is extended.fitted else first
     other = extend(replace(base, rounds=(*base.rounds[:-1], missed.ranking)), task)
     better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
     return other if better and set(other.doubtful) == set(extended.doubtful) else extended
@@ -91,33 +90,48 @@ def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage
     What came first is taken out again, and the model extended the straight way from what came after
     it. That counts if nothing is left then, of the test recordings neither.
     """
-    if not _leaves_a_residual(start, extended):
+    if task.most < 2 or not _leaves_a_residual(start, extended):
         return extended
-    first = extended.rounds[0]
+    first, doubtful = extended.rounds[0], set(extended.doubtful)
+    straight = {one.score.effect.label for one in extended.found[:1]}
     passing = {one.effect.label for one in first.passing}
     alone = [one for one in first.scores if one.effect.label not in passing and one.drop > 0.0]
     begun = [one for one in alone if not one.not_identifiable][:_WAYS]
-    two = replace(task, most=min(task.most, 2))
-    for tried, one in enumerate(begun, 1):
-        label = one.effect.label
-        task.progress(f"beginning with {label}, whatever its significance")
-        waits = f"asked again beside {label}"
-        refusals = ("" if other is one else waits for other in first.scores)
-        pair = extend(_from(start, replace(first, refusals=tuple(refusals))), two)
-        alike = set(pair.doubtful) == set(extended.doubtful)
-        if not (alike and pair.proposals == 2 and _is_enough(pair)):
+    for number, one in enumerate(begun, 1):
+        task.progress(f"beginning with {one.effect.label}, whatever its significance")
+        pair = _beside_another(_from(start, first), AddedEffect(one, 1.0, ()), straight, task)
+        if pair is None or set(pair.doubtful) != doubtful or not _is_enough(pair):
             continue
         both = _without_its_first(pair, task)
-        if _is_enough(both) and _is_enough_for_others(both):
+        alike = set(both.doubtful) == doubtful
+        if alike and _is_enough(both) and _is_enough_for_others(both):
             # As many beginnings are as many searches.
-            found = (replace(f, p_value=min(1.0, tried * f.p_value)) for f in both.found)
+            found = (replace(f, p_value=min(1.0, number * f.p_value)) for f in both.found)
             return _with_first_round(replace(both, found=tuple(found)), extended)
     return extended
 
 
+def _beside_another(
+    start: Stage, begun: AddedEffect, straight: Collection[str], task: DiagnosisTask
+) -> Stage | None:
+    """Return the model with an effect, and what is significant beside it.
+
+    None where nothing is, or only that from which the straight way went already, by its label.
+    """
+    with_it, refused = tried(start, begun, task)
+    if refused:
+        return None
+    ranked = rank_stage(with_it, task)
+    best = choose(ranked.evidence, ranked.fitted, ranked.rounds[-1])
+    if best is None or best.score.effect.label in straight:
+        return None
+    pair = with_one_more(ranked, task)
+    return pair if pair.proposals == 2 else None
+
+
 def _from(start: Stage, ranking: Ranking) -> Stage:
-    """The model as given with another first round; columns of other ways belong to their models."""
-    return replace(start, evidence=start.evidence.looked_at_anew(), rounds=(ranking,))
+    """The model as given with another first round."""
+    return replace(start, rounds=(ranking,))
 
 
 def _with_first_round(stage: Stage, extended: Stage) -> Stage:

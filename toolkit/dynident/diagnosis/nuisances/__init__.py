@@ -11,5 +11,6 @@ that says so.
 - `reversal_laws`: other laws of dry friction, which effects at reversals must beat;
   `other_reversals` has them.
 - `look_alikes`: what an effect that was added may be instead, where no single rival says so.
+- `drifting_noise`: what changes from repetition to repetition, and is measured as noise.
 - `quantisation`: the residual that the steps of encoders leave, the same in every repetition.
 """

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from dynident.diagnosis.search.moment_objective import MomentObjective
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
@@ -25,6 +26,8 @@ _GOES_ON = 1.0 + 1e-3
 go on: along a direction that tells nothing it would leave for shapes that are another law."""
 _AT_END = 2.0
 """Precisions from an end of a bracket within which the best lies beyond it."""
+AS_MUCH = float(chdtri(1, 0.05))
+"""Squared, whitened residual that one shape must explain more than another to be told from it."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,10 @@ def refined(
             if not gained or not objective.went_as_far_as_it_may(better):
                 return better
             objective = replace(objective, one=better)
-    return _better(objective.one, _by_trial(objective))
+    found = _by_trial(objective)
+    if one.effect.time_varying and found.drop - objective.one.drop < AS_MUCH:
+        return objective.one
+    return _better(objective.one, found)
 
 
 def _better(one: Score, *others: Score) -> Score:

@@ -8,8 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.criteria import SearchCriteria
-from dynident.diagnosis.search.candidate_shapes import refined
-from dynident.diagnosis.search.cross_validation import cross_validate, helps_on_blocks
+from dynident.diagnosis.search.candidate_shapes import AS_MUCH, refined
+from dynident.diagnosis.search.cross_validation import (
+    cross_validate,
+    helps_on_blocks,
+    left_out_losses,
+)
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
 from dynident.diagnosis.search.scoring import (
     Score,
@@ -139,7 +143,7 @@ def rank(
         progress(effect.label)
         tried = list(_score_variants(evidence, fitted, effect))
         tests += max(len(tried), shapes_tried(evidence, effect))
-        best.append(_best_of(tried, evidence, fitted))
+        best.append(_best_of(tried))
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
     hopeful = [i for i in order if _may_win(best[i], tests, criteria.search)]
@@ -225,31 +229,17 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
         yield _possible(score(fitted, shaped, *parts, grid=count), evidence, fitted)
 
 
-def _best_of(tried: list[Score], evidence: Evidence, fitted: EvidenceFit) -> Score:
-    """The score of the best shape; of a change in time, of those that a fit finds best.
+def _best_of(tried: list[Score]) -> Score:
+    """The score of the best shape; of a change in time, the least change that explains as much.
 
-    With instruments of another time, what a slow change takes away need not grow with how well it
-    fits: beside friction that is its own opposite it may take away the most. A fit of the whole
-    tells.
+    A session that is short beside a change shows a ramp, whatever the time that the change takes:
+    the longer that is, the larger are the values of the same ramp.
     """
     best = max(tried, key=lambda s: s.penalised)
-    effect = best.effect
-    if not effect.time_varying or len(effect.shape) != 1 or not best.penalised > 0:
+    if not best.effect.time_varying or not best.penalised > 0:
         return best
-    along = sorted(tried, key=lambda s: s.effect.shape)
-    ends = [-np.inf, *(one.penalised for one in along), -np.inf]
-    tops = [
-        one
-        for before, one, after in zip(ends, along, ends[2:], strict=False)
-        if one is best or one.penalised > max(0.0, before, after)
-    ]
-    if len(tops) < 2:
-        return best
-
-    def misfit(one: Score) -> float:
-        return fit_evidence(evidence, fitted.model + one.effect, fitted).misfit(fitted)
-
-    return min(tops, key=misfit)
+    as_much = (one for one in tried if best.penalised - one.penalised < AS_MUCH)
+    return min(as_much, key=lambda one: np.linalg.norm(one.values))
 
 
 def _possible(one: Score, evidence: Evidence, fitted: EvidenceFit) -> Score:
@@ -316,10 +306,12 @@ def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
         parts = tuple(
             moments_with_payload(part, evidence, one.payload_recordings) for part in parts
         )
-    without, with_effect = cross_validate(fitted, *parts)
+    without, with_effect = cross_validate(fitted.beside(one.effect), *parts)
+    gains = without - with_effect
     # Columns taken at a value count as far as that is the value found.
     relaxed = one.penalised - (one.drop - one.drop_at_point)
-    return replace(one, penalised=relaxed, losses=with_effect, gains=without - with_effect)
+    # Of what the fit itself misses: the losses of rivals are compared.
+    return replace(one, penalised=relaxed, losses=left_out_losses(fitted) - gains, gains=gains)
 
 
 def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, least: float) -> str:

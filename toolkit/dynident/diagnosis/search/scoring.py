@@ -17,8 +17,8 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.evidence.time_varying import (
+    of_the_torque,
     time_varying_columns,
-    time_varying_mask,
     time_varying_variants,
 )
 from dynident.model import Model, not_met
@@ -100,8 +100,7 @@ def candidate_moments(
     (B, p + 1, k) and (B, k, k) for each variant
     """
     joints = variants[0].acting_at(fitted.model.robot)
-    time_varying = time_varying_mask(fitted.model)
-    mixed = variants[0].time_varying or time_varying.any()
+    mixed = variants[0].time_varying or fitted.model.is_time_varying
     columns = (columns_of or evidence.columns)(variants, fitted.model, fitted.values)
     with_model, with_self, width = [], [], columns[0][0][0].shape[2]
     for stack, white_of_model in zip(evidence.stacks, fitted.white, strict=True):
@@ -123,13 +122,12 @@ def candidate_moments(
                 new = time_varying_variants(evidence, variants, stack, joint, noise, measured)
                 dense = known.dense()
                 old = time_varying_columns(evidence, fitted.model, stack, joint, noise, dense)
-                chosen = time_varying[:, None] | np.full(white.shape[1], variants[0].time_varying)
-                one[-1] = one[-1].where(chosen, time_varying_products(old, new, edges))
-                if variants[0].time_varying:
-                    products = time_varying_products(new, new, edges)
-                    apart = products.reshape(-1, len(variants), width, len(variants), width)
-                    of_each = np.einsum("bvivj->bvij", apart)
-                    two[-1] = two[-1].where(np.array(True), of_each)
+                if variants[0].linear_in_torque:
+                    new = of_the_torque(new, old, fitted.values)
+                one[-1] = one[-1].with_signal(time_varying_products(old, new, edges))
+                products = time_varying_products(new, new, edges)
+                apart = products.reshape(-1, len(variants), width, len(variants), width)
+                two[-1] = two[-1].with_signal(np.einsum("bvivj->bvij", apart))
         with_model.append(reduce(add, one))
         with_self.append(reduce(add, two))
     beside, own = SecondMoments.stacked(with_model), SecondMoments.stacked(with_self)
@@ -183,7 +181,7 @@ def score(
     -------
     Not yet cross-validated; marked where the model already explains all that it could.
     """
-    own = with_self.pooled()
+    fitted, own = fitted.beside(effect), with_self.pooled()
     scale = np.sqrt(np.clip(np.diag(own.signal), 0.0, None))
     seen = _seen(effect, fitted, scale)
     if not np.any(seen) or not np.all(np.isfinite(own.signal)):
