@@ -186,13 +186,13 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         """
         return ()
 
-    def line_over_position(self, robot: Robot) -> bool:
-        """Whether its one shape is the phase of a wave per unit of its joint's position.
+    def lines_over_position(self, robot: Robot) -> tuple[float, float] | None:
+        """Limits of its one shape where that is the phase of a wave per unit of the position.
 
-        Of such a wave a spectrum over the positions tells where to look between the values of the
-        grid; False, the default, where the grid is near enough to every shape.
+        Between them a spectrum over the positions tells where to look, between the values of the
+        grid or beyond them; None, the default, where the grid is near enough to every shape.
         """
-        return False
+        return None
 
     def unresolved(self, values: Sequence[float], step: float) -> str:
         """Why such values say nothing at a time of `step` s between samples; empty if they do."""

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from dynident.effects import Block, Effect
+from dynident.effects.position_lines import PositionLines
 from dynident.errors import FitError
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.linear_solution import solve_factors
@@ -178,7 +179,21 @@ class _RowObjective:
     def screened(self) -> tuple[Effect, ...]:
         """Return the best of the variants: of all combinations, or of each effect in turn."""
         robot = self.model.robot
-        return screened([(e, *e.variants(robot)) for e in self.effects], self.loss, _SCREEN_MOST)
+        tried = [(e, *e.variants(robot), *self._lines(e)) for e in self.effects]
+        return screened(tried, self.loss, _SCREEN_MOST)
+
+    def _lines(self, effect: Effect) -> tuple[Effect, ...]:
+        """An effect with shapes that a spectrum over position finds in what the rest leaves."""
+        robot, samples = self.model.robot, self._samples
+        if effect.lines_over_position(robot) is None:
+            return ()
+        j = robot.names.index(str(effect.joint))
+        q, v = (
+            np.concatenate(x) for x in ([s.q[:, j] for s in samples], [s.v[:, j] for s in samples])
+        )
+        rate = max(one.rate_hz for one in samples)
+        found = PositionLines.of(effect, robot, (q, v), rate)
+        return () if found is None else found.highest(q, self.torque[j :: robot.n])
 
     def loss(self, effects: tuple[Effect, ...]) -> float:
         """Squares that effects leave, in units of each joint's residual."""

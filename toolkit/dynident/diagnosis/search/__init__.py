@@ -9,7 +9,7 @@ it. Out: a `Ranking` of every effect that the model lacks, and the effect to add
 - `ranking`: all effects scored, the best refined and cross-validated; the gates.
 - `candidate_shapes` and what they call: the shape parameters, and the values at which columns are
   linearised, at which an effect explains most. `shaped_fit`: the same for effects in the model.
-- `shapes.position_lines`: ripple along a slide, between the values of its grid.
+- `shapes.residual_lines`: ripple over the position, between the values of its grid or beyond them.
 - `global_search`: every shape there may be, where the grid has missed the true one.
 - `payload_recordings`: which recordings carry the payload, where the study does not say.
 - `selection`: which effect is added, what cannot be told from it, and what is dropped at the end.

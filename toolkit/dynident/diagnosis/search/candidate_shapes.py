@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from dynident.diagnosis.search.moment_objective import MomentObjective
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
-from dynident.diagnosis.search.shapes.position_lines import line_width, lines
+from dynident.diagnosis.search.shapes.residual_lines import line_width, lines
 from dynident.effects import Effect, ShapeParameter
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -147,7 +147,9 @@ def _by_bracket(objective: MomentObjective, shape: ShapeParameter) -> Score:
     near = _neighbours(shape, effect.shape[0])
     if width := line_width(objective.evidence, effect):
         # Further away there are side lobes, which lead astray.
-        near = max(near[0], effect.shape[0] - 2 * width), min(near[1], effect.shape[0] + 2 * width)
+        around = effect.shape[0] - 2 * width, effect.shape[0] + 2 * width
+        beyond = effect.shape[0] > max(shape.grid)
+        near = around if beyond else (max(near[0], around[0]), min(near[1], around[1]))
         precision = min(precision, _OF_A_LINE * width / effect.shape[0])
     low, high = (shape.coordinate(x) for x in near)
     ends = shape.coordinate(shape.lower), shape.coordinate(shape.upper)

@@ -22,7 +22,7 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
-from dynident.diagnosis.search.shapes.position_lines import shapes_tried
+from dynident.diagnosis.search.shapes.residual_lines import shapes_tried
 from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

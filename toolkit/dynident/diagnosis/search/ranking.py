@@ -22,7 +22,7 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
-from dynident.diagnosis.search.shapes.position_lines import lines, shapes_tried
+from dynident.diagnosis.search.shapes.residual_lines import lines, shapes_tried
 from dynident.effects import Block, Effect, catalogue, law_effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals

@@ -13,11 +13,15 @@ from dynident.effects.effect import (
     motion_unit,
 )
 
+_MOST_IN_A_TURN = 500.0
+
 
 class TorqueRipple(JointEffect):
     """One harmonic of the position: As sin(k q) + Ac cos(k q).
 
-    k is in cycles per revolution, or in cycles per 2 pi metres for a prismatic joint (rad/m).
+    k is in cycles per revolution, or in cycles per 2 pi metres for a prismatic joint (rad/m). Up to
+    60 cycles whole numbers are tried; beyond, up to the 500 of a gear's fast side, what a spectrum
+    of the residual over the position shows, as far as half of the rows are slow enough for it.
     """
 
     name = "torque_ripple"
@@ -52,13 +56,17 @@ class TorqueRipple(JointEffect):
         grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
         return (
             ShapeParameter(
-                "k", "1/rev", grid, lower=1.0, upper=500.0, means="ripples per revolution"
+                "k", "1/rev", grid, lower=1.0, upper=_MOST_IN_A_TURN, means="ripples per revolution"
             ),
         )
 
-    def line_over_position(self, robot):
-        # In a turn, what teeth and magnets make comes a whole number of times.
-        return motion_unit(robot, self.joint) == "m"
+    def lines_over_position(self, robot):
+        grid = self.shape_parameters(robot)[0].grid
+        if motion_unit(robot, self.joint) == "m":
+            return grid[0], grid[-1]
+        # In a turn, what teeth and magnets make comes a whole number of times: the grid has them
+        # all, but for those of a gear's fast side, which comes round some hundred times.
+        return grid[-1], _MOST_IN_A_TURN
 
     def at_joint(self, block: Block) -> np.ndarray:
         phase = self.shape[0] * block.q[:, [block.index(self.joint)]]
