@@ -10,6 +10,7 @@ from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.dependence.residual_dependence import JointDependence
 from dynident.diagnosis.details import (
     Candidate,
+    HidingFilter,
     JointResult,
     Step,
     TestError,
@@ -96,6 +97,8 @@ class Answer:
         models were fitted with those.
     sampled : when the torque acts, where that is not when the study says.
     too_fast : the joint that is faster than it can be, as the study reads its position.
+    hiding_filter : the study's low-pass of the positions where it hides motion and something is
+        left that this may have made; else None.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -133,6 +136,7 @@ class Answer:
     friction_widths: Mapping[str, float] = field(default_factory=dict)
     sampled: SamplingTime | None = None
     too_fast: OverSpeed | None = None
+    hiding_filter: HidingFilter | None = None
     switches: Switches | None = None
     drives: DriveGains | None = None
     drives_anew: DriveGains | None = None

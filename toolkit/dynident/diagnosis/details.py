@@ -65,6 +65,33 @@ class Candidate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class HidingFilter:
+    """A low-pass of the positions that hides motion, which no torque can follow then.
+
+    Attributes
+    ----------
+    cutoff_hz : that of the study.
+    suited_hz : the one that suits the recordings.
+    """
+
+    cutoff_hz: float
+    suited_hz: float
+
+    @property
+    def sentence(self) -> str:
+        """What it may have done."""
+        return (
+            f"The low-pass of the positions ({self.cutoff_hz:.4g} Hz; {self.suited_hz:.3g} Hz "
+            "suits these recordings) hides motion, and what is left may be no more than that."
+        )
+
+    @property
+    def mend(self) -> str:
+        """What to change in a study."""
+        return f"leave position_cutoff_hz = {self.cutoff_hz:.4g} out of [filter]"
+
+
+@dataclass(frozen=True, kw_only=True)
 class JointFall:
     """What an effect does to the held-out error of one joint, over that joint's own torque.
 

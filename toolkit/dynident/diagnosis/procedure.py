@@ -31,6 +31,7 @@ from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.advice.coupled_pairs import alike_notes
 from dynident.diagnosis.advice.geometry_doubt import with_geometry_doubt
+from dynident.diagnosis.advice.hiding_filter import with_filter_doubt
 from dynident.diagnosis.assembly import Search, assemble
 from dynident.diagnosis.dependence.what_is_left import doubted, with_dependence
 from dynident.diagnosis.details import Withdrawn
@@ -145,7 +146,7 @@ def diagnose(
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, settled.judging, path)
     found = replace(found, notes=(*found.notes, *alike_notes(found)))
-    return with_geometry_doubt(found, settled.evidence.runs)
+    return with_filter_doubt(with_geometry_doubt(found, settled.evidence.runs), train)
 
 
 def _compare(

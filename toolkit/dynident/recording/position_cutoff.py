@@ -29,6 +29,7 @@ from dynident.recording.filters import (
 from dynident.recording.low_pass.sections import response
 from dynident.recording.plausibility import resolution
 from dynident.recording.recording import Recording
+from dynident.recording.uniform import uniform
 from dynident.recording.white_noise import encoder_noise_std
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
@@ -42,6 +43,8 @@ what both leave."""
 _JUMP = 0.5
 """Jump of the acceleration where dry friction turns round, of its root mean square: with less the
 noise counts more, which is in every row."""
+_HIDES = 0.7
+"""Times the cut-off that suits recordings, below which a filter hides motion that it need not."""
 _ALIKE = 1.05  # largest over smallest of the rates that recordings are decimated to
 _PARTS, _LENGTH = 16, 4096
 """Parts of a recording that are looked at, spread over it, and samples of each at most."""
@@ -148,6 +151,22 @@ def common_filter(recordings: Sequence[Recording]) -> Filter | None:
     """
     usual = [default_filter(one.rate_hz).rate_hz or 0.0 for one in recordings]
     return suited_filter(recordings) if max(usual) <= _ALIKE * min(usual) else None
+
+
+def suited_instead(cutoff_hz: float, recordings: Sequence[Recording]) -> float | None:
+    """Return the cut-off that suits recordings, where another one hides motion that it need not.
+
+    Parameters
+    ----------
+    cutoff_hz : of the low-pass of the positions.
+    recordings : that it filters.
+
+    Returns
+    -------
+    In Hz; None where the other is not far below it.
+    """
+    suited = suited_filter([uniform(one) for one in recordings]).position_cutoff_hz
+    return suited if suited and cutoff_hz < _HIDES * suited else None
 
 
 def suited_filter(recordings: Sequence[Recording]) -> Filter:

@@ -61,6 +61,8 @@ def headline(diagnosis: Diagnosis) -> Headline:
     found = _with_doubt(_of_verdict(diagnosis), diagnosis)
     if diagnosis.sampled is not None:
         found = _doubted(found, "The torque is of another moment than the study says.")
+    if diagnosis.hiding_filter is not None:
+        found = _doubted(found, "The low-pass of the positions hides motion: settle that first.")
     if diagnosis.reversals_left_out:
         where = listed(list(diagnosis.reversals_left_out))
         found = _doubted(found, f"The reversals of {where} are left out: see the notes.")

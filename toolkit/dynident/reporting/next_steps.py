@@ -48,7 +48,8 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     # Friction and inertia have taken up a wrong moment: whatever is added comes after that.
     instead, besides = _to_try(diagnosis)
-    found = [*_to_settle(diagnosis), *_to_time(diagnosis), *instead, *_to_add(diagnosis)]
+    first = [*_to_settle(diagnosis), *_to_unhide(diagnosis), *_to_time(diagnosis)]
+    found = [*first, *instead, *_to_add(diagnosis)]
     if diagnosis.limit is not None and diagnosis.too_fast is None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
@@ -155,6 +156,15 @@ def _to_settle(diagnosis: Diagnosis) -> list[Advice]:
     )
     why = f"{diagnosis.too_fast.sentence} What is added before that may take up the wrong motion."
     return [Advice(what, why)]
+
+
+def _to_unhide(diagnosis: Diagnosis) -> list[Advice]:
+    """That the filter hides motion: what is left may be that, and effects may take it up."""
+    hiding = diagnosis.hiding_filter
+    if hiding is None:
+        return []
+    what = f"{hiding.mend[0].upper()}{hiding.mend[1:]}, and ask again."
+    return [Advice(what, hiding.sentence, ("dynident explain STUDY",))]
 
 
 def _to_time(diagnosis: Diagnosis) -> list[Advice]:

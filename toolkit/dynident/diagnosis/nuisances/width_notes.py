@@ -15,6 +15,10 @@ from dynident.fitting.reversals.standing_joints import width_advice
 from dynident.model import dry_joints
 from dynident.tables import number
 
+_HARDLY = 0.1
+"""Change of a width, as a logarithm, below which nobody need write another: the jitter of a drive
+makes as much, and the data tell it to a part of that."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FoundWidths:
@@ -39,7 +43,7 @@ def found_widths(evidence: Evidence, fitted: EvidenceFit) -> FoundWidths:
     found: dict[str, float] = {}
     for joint, unit in zip(model.robot.names, model.robot.units, strict=True):
         profile = WidthProfile(evidence, fitted, joint)
-        if joint not in dry_joints(model) or profile.width == stated[joint]:
+        if joint not in dry_joints(model) or abs(np.log(profile.width / stated[joint])) < _HARDLY:
             continue
         if f"presliding@{joint}" in model.slices:
             continue  # presliding tells how friction reverses: the width is of what is beside it

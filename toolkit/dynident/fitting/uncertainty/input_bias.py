@@ -25,7 +25,7 @@ from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.uncertainty.expected_bias import listed, reported
 from dynident.fitting.uncertainty.noisy_part import NoisyPart
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, default_filter, suited_filter, uniform
+from dynident.recording import Dataset, Recording, default_filter, suited_instead
 from dynident.tables import number
 
 _MOST = 16384
@@ -39,8 +39,6 @@ foretold to about a third (measured on simulated two-link arms that follow their
 _LEAST = 0.1
 """Share of signal in a direction below which the correction is not carried on: there the bias is
 nine times what is left at least."""
-_LOW = 0.7
-"""Times the cut-off that suits recordings, below which a filter hides motion that it need not."""
 _NAMED = 4
 
 
@@ -56,7 +54,8 @@ class InputBias:
     sigma : (p,) standard deviations without it; NaN where a parameter is not identified.
     position_std : (n,) of the encoders' noise, rad or m.
     cutoff_hz : of the positions' low-pass; None without one.
-    suited_hz : the one that suits the recordings, where a bias is to be said; None where it is not.
+    suited_hz : the one that suits the recordings, where a bias is to be said and `cutoff_hz` is far
+        below it; else None.
     """
 
     model: Model
@@ -113,7 +112,7 @@ class InputBias:
         """Why the fit is biased, most of all in one parameter, a clause; and what mends that."""
         if np.abs(self.trembling[worst]) > np.abs(self.values[worst]) / 2:
             cutoff, suited = self.cutoff_hz, self.suited_hz
-            if cutoff and suited and cutoff < _LOW * suited:
+            if cutoff and suited:
                 return (
                     "The low-pass of the positions hides motion, which biases this fit",
                     f"Remedy: leave position_cutoff_hz = {cutoff:.4g} out of [filter]; "
@@ -176,8 +175,7 @@ def input_bias(
     )
     if found.cutoff_hz is None or not found.headline:
         return found
-    recordings = [uniform(one) for one in dataset.recordings]
-    return replace(found, suited_hz=suited_filter(recordings).position_cutoff_hz)
+    return replace(found, suited_hz=suited_instead(found.cutoff_hz, dataset.recordings))
 
 
 def _products_of_recording(
