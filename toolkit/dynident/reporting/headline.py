@@ -198,8 +198,8 @@ def _found(diagnosis: Diagnosis) -> str:
     if all(step.effect.found_by == "repetition" for step in diagnosis.steps):
         # What happened once is no part of the errors.
         names = _capitalised(listed([step.effect.title for step in diagnosis.steps]))
-        were = "was" if len(diagnosis.steps) == 1 else "were"
-        return f"{names} {were} found, and beside it the torque error is {percent(error.after)}"
+        were, it = ("was", "it") if len(diagnosis.steps) == 1 else ("were", "them")
+        return f"{names} {were} found, and beside {it} the torque error is {percent(error.after)}"
     before, after = two_percent(error.before, error.after)
     effects = LeadingEffects.of(diagnosis.steps)
     own, local = effects.own_joint_in_words(error, diagnosis.joints), effects.local_in_words

@@ -371,7 +371,7 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
     where = listed(worst[:3]) or "the joints"
     explained = "that no effect of the catalogue explains"
     if diagnosis.only_withdrawn:
-        explained = "for which what training recordings call for was withdrawn"
+        explained = "that no effect explains which helps on held-out data, too"
     return Advice(
         f"Look at the pictures of {where} in the report: something is left there {explained}.",
         "The shape in the pictures is what is known of it. Rule out the simple causes first: a "

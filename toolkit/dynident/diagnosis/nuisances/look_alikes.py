@@ -51,8 +51,8 @@ def _constants(added: list[Effect], fitted: EvidenceFit) -> Iterator[str]:
         if effect.name == "torque_offset" and other not in fitted.model.slices:
             yield (
                 f"{effect.title} may also be dry friction that is larger in one direction than in "
-                "the other (dFc of asymmetric friction): the torque is the same, and no motion "
-                "tells them apart."
+                "the other (dFc of asymmetric friction): the torque is the same but where the "
+                "joint turns round, and hardly any motion tells them apart."
             )
 
 
