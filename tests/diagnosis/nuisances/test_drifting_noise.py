@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import dynident as di
 from dynident.diagnosis.nuisances.drifting_noise import drift_notes, drifts_in
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
+from dynident.moments.repetition_drift import DriftSums
 from dynident.recording import Dataset, Recording
 from study_files import true_model
 from synthetic import synthetic, true_values
@@ -71,3 +73,33 @@ def test_what_rises_is_told_with_its_size(repetitions: int) -> None:
 
 def test_nothing_is_said_of_what_does_not_drift() -> None:
     assert drift_notes(()) == ()
+
+
+def test_a_fit_says_so_first() -> None:
+    made = recorded(0, 6)
+    speed = np.gradient(made.q[:, 1], made.t)
+    part = made.t / made.t[-1] - 0.5
+    warming = with_torque(made, 0.6 * part * np.tanh(speed / 0.05))
+    assert di.fit(true_model(), Dataset((made,))).headline == ""
+    said = di.fit(true_model(), Dataset((warming, recorded(1, 6)))).headline
+    assert said.startswith("Repetitions differ the more, the longer they lie apart")
+    assert "N m at elbow (" in said and "shoulder" not in said
+
+
+def test_two_repetitions_do_not_tell_noise_from_what_drifts() -> None:
+    rng = np.random.default_rng(0)
+    every = np.ones((50, 2), dtype=bool)
+    assert DriftSums.of(rng.normal(size=(2, 50, 2)), every) is None
+
+
+def test_rows_that_do_not_count_say_nothing() -> None:
+    """Those in which something rises are left out, at one joint and not at the other."""
+    rng = np.random.default_rng(0)
+    folded, counting = rng.normal(size=(4, 400, 2)), np.ones((400, 2), dtype=bool)
+    folded[:, :200] += 3.0 * np.arange(4)[:, None, None]
+    counting[:200, 0] = False
+    sums = DriftSums.of(folded, counting)
+    assert sums is not None
+    (one,) = (sums + sums).drifts(("a", "b"), ("N m", "N m"))
+    assert one.joint == "b"
+    assert one.steady == pytest.approx(1.0, abs=0.1)

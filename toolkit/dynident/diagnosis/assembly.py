@@ -26,7 +26,7 @@ from dynident.diagnosis.details import (
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
-from dynident.diagnosis.nuisances.drifting_noise import Drift, drift_notes, drifts_in
+from dynident.diagnosis.nuisances.drifting_noise import drift_notes, drifts_in
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.sampling_time import sampling_time
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
@@ -54,6 +54,7 @@ from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.model import Model
+from dynident.moments.repetition_drift import Drift
 from dynident.recording import Dataset, RowCount
 from dynident.recording.dataset import NoiseSource
 

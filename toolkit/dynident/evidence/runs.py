@@ -71,10 +71,10 @@ class Run:
 
     def certain(self, joint: int) -> np.ndarray:
         """Instants (S,) at which a joint's dry friction is known in every repetition, a mask."""
-        return self._certain[:, joint]
+        return self.certain_instants[:, joint]
 
     @cached_property
-    def _certain(self) -> np.ndarray:
+    def certain_instants(self) -> np.ndarray:
         """The same of every joint, (S, n)."""
         if self.uncertain is None:
             return np.ones((self.index.shape[1], self.replicates[0].tau.shape[1]), dtype=bool)

@@ -82,9 +82,11 @@ class LeastSquares:
         found = row_errors(model, dataset, solution.values, solution, columns)
         covariance, words, headline = found.covariance, found.words, ""
         judged = lack_of_fit(model, dataset, solution.values)
+        if judged is not None:
+            headline = judged.headline
         if judged is not None and judged.beyond_noise:
             other, words = scattered(model, dataset, solution.values, solution)
-            covariance, headline = widened(covariance, other), judged.headline
+            covariance = widened(covariance, other)
         kept = list(solution.basis.independent)
         whole = np.zeros_like(solution.covariance)
         whole[np.ix_(kept, kept)] = covariance

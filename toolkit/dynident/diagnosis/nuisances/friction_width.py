@@ -107,7 +107,7 @@ class WidthProfile:
         missed = self.missed(grid)
         k = int(np.argmin(missed))
         low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
-        found = minimize_scalar(
+        found: Any = minimize_scalar(
             lambda x: self.missed(np.exp([x]))[0],
             bounds=(np.log(low), np.log(high)),
             method="bounded",

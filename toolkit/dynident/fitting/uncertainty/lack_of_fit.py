@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.fitting.uncertainty.encoder_steps import rounding_power
 from dynident.model import Model
+from dynident.moments.repetition_drift import Drift, DriftSums, drift_in_words
 from dynident.recording import (
     Dataset,
     Filter,
@@ -51,6 +54,7 @@ class LackOfFit:
     steps : (n,) root mean square of what encoders' steps leave at most, the same in every
         repetition, N m or N; looked at where more than noise is there.
     beyond_steps : (n,) as `excess`, of what is more than the steps leave.
+    drifts : what grows with the distance in time of repetitions, and counts as noise.
     """
 
     joints: tuple[str, ...]
@@ -60,6 +64,7 @@ class LackOfFit:
     excess: np.ndarray
     steps: np.ndarray
     beyond_steps: np.ndarray
+    drifts: tuple[Drift, ...] = ()
 
     @property
     def beyond_noise(self) -> bool:
@@ -74,6 +79,14 @@ class LackOfFit:
     @property
     def headline(self) -> str:
         """What is to be read before any number; empty where nothing speaks against the model."""
+        drifting = drift_in_words(self.drifts)
+        if drifting:
+            drifting += " Parameters are of a mean over it. `dynident explain` looks for its cause."
+        return " ".join(filter(None, (self._rejection, drifting)))
+
+    @property
+    def _rejection(self) -> str:
+        """What repetitions have in common that speaks against the model; empty for nothing."""
         if not self.beyond_noise:
             return ""
         said = self._at(self.beyond_steps if self.rejected else self.excess)
@@ -126,16 +139,20 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
     found = [one for one in passes if one is not None]
     if not found:
         return None
-    systematic, noise, spread, rows = (np.sum(one, axis=0) for one in zip(*found, strict=True))
+    sums = zip(*(one for one, _ in found), strict=True)
+    systematic, noise, spread, rows = (np.sum(one, axis=0) for one in sums)
+    drift = [one for _, one in found if one is not None]
+    names, units = model.robot.names, model.robot.torque_units
     scale = np.sqrt(np.maximum(spread, np.finfo(float).tiny))
     judged = LackOfFit(
-        joints=model.robot.names,
-        units=model.robot.torque_units,
+        joints=names,
+        units=units,
         systematic=np.sqrt(np.maximum(systematic / rows, 0.0)),
         noise=np.sqrt(noise / rows),
         excess=systematic / scale,
         steps=np.zeros(model.robot.n),
         beyond_steps=systematic / scale,
+        drifts=reduce(add, drift).drifts(names, units) if drift else (),
     )
     if not judged.beyond_noise:
         return judged
@@ -150,8 +167,8 @@ def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit
 
 def _of_recording(
     recording: Recording, model: Model, settings: Filter | None, values: np.ndarray
-) -> tuple[np.ndarray, ...] | None:
-    """What `_apart` says of a recording; None where it does not repeat."""
+) -> tuple[tuple[np.ndarray, ...], DriftSums | None] | None:
+    """What `_apart` says of a recording, and what drifts; None where it does not repeat."""
     if not recording.period:
         return None
     sampled, folded = sample(recording, settings), None
@@ -165,7 +182,8 @@ def _of_recording(
     positions = even.q[np.searchsorted(even.t, sampled.t)]
     points = as_points(positions, turning_round(even))
     require_repetition(points, folded, recording.where)
-    return _apart(folded.fold(left), folded.fold(sampled.counting))
+    each, counting = folded.fold(left), folded.fold(sampled.counting)
+    return _apart(each, counting), DriftSums.of(each, np.asarray(counting.all(axis=0)))
 
 
 def scattered(
