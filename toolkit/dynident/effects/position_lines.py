@@ -81,9 +81,15 @@ class PositionLines:
 
     @property
     def tried(self) -> int:
-        """Shapes that count as tried: of the grid, and lines that the spectrum could name."""
-        more = math.ceil((self.high - self.low) / self.width)
+        """Shapes within the grid that count as tried: its own, and lines that could be named."""
+        end = max(self.low, min(self.high, self.grid[-1]))
+        more = math.ceil((end - self.low) / self.width)
         return len(self.grid) - len(self.inside) + max(len(self.inside), more)
+
+    @property
+    def beyond(self) -> int:
+        """Lines beyond the grid that the spectrum could name."""
+        return max(0, math.ceil((self.high - max(self.low, self.grid[-1])) / self.width))
 
     def highest(self, q: np.ndarray, residual: np.ndarray) -> tuple[Effect, ...]:
         """Return the effect with the shapes at which the spectrum of a residual is highest.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,7 +23,12 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
-from dynident.diagnosis.search.shapes.residual_lines import lines, shapes_tried
+from dynident.diagnosis.search.shapes.residual_lines import (
+    is_beyond,
+    lines,
+    lines_beyond,
+    shapes_tried,
+)
 from dynident.effects import Block, Effect, catalogue, law_effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
@@ -32,6 +38,9 @@ from dynident.moments.replicates import Kind
 
 _ALIKE = 1e-10
 """Share of the squared residual by which scores of the same differ, as they are rounded."""
+_BEYOND = 0.1
+"""Share of all chances of a false effect that lines beyond the grids of ripples have: hundreds of
+them, which few robots have, are not to make the others less significant (weighted Bonferroni)."""
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -128,7 +137,7 @@ def rank(
     Every effect at its best shape, best first, with the gate that it does not pass; what can be
     significant nowhere stands last.
     """
-    criteria, best, tests = evidence.criteria, [], 0
+    criteria, best, tests, beyond = evidence.criteria, [], 0, 0
     noisy = carries_noise(evidence)
     asked = only or tuple(candidates(fitted.model))
     below_noise: frozenset[str] = frozenset()
@@ -142,14 +151,19 @@ def rank(
             continue
         progress(effect.label)
         tried = list(_score_variants(evidence, fitted, effect))
-        tests += max(len(tried), shapes_tried(evidence, effect))
+        within = sum(not is_beyond(one.effect, fitted.model.robot) for one in tried)
+        tests += max(within, shapes_tried(evidence, effect))
+        beyond += lines_beyond(evidence, effect)
         best.append(_best_of(tried))
+    tests += math.ceil(_BEYOND * tests) if beyond else 0
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
     hopeful = [i for i in order if _may_win(best[i], tests, criteria.search)]
     for i in hopeful[: len(only) or criteria.search.contenders]:
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
+    dearer = beyond / (_BEYOND * tests) if tests else 1.0
+    best = [_at_its_price(one, dearer, fitted.model) for one in best]
     if least is None:
         least = criteria.gates.later_share if added else criteria.gates.first_share
     order = best_first([one.penalised for one in best], alike)
@@ -159,6 +173,13 @@ def rank(
         _unseen(s, noisy) or _refusal(s, evidence, fitted, tests, least) for s in scores
     )
     return Ranking(scores, tests, refusals)
+
+
+def _at_its_price(one: Score, dearer: float, model: Model) -> Score:
+    """A score whose p value, times the tests, holds those that are made for its kind alone."""
+    if one.not_identifiable or not is_beyond(one.effect, model.robot):
+        return one
+    return replace(one, p_value=min(1.0, one.p_value * max(1.0, dearer)))
 
 
 def best_first(values: Sequence[float], alike: float) -> list[int]:
@@ -223,10 +244,12 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
         # Found before, where no variant may be near enough.
         shapes = list(dict.fromkeys([*shapes, effect]))
     count = max(len(shapes), shapes_tried(evidence, effect))
+    more, robot = lines_beyond(evidence, effect), fitted.model.robot
     shapes = list(dict.fromkeys([*shapes, *lines(evidence, fitted, effect)]))
     found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield _possible(score(fitted, shaped, *parts, grid=count), evidence, fitted)
+        grid = count + more if is_beyond(shaped, robot) else count
+        yield _possible(score(fitted, shaped, *parts, grid=grid), evidence, fitted)
 
 
 def _best_of(tried: list[Score]) -> Score:

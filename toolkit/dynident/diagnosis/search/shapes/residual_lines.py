@@ -9,6 +9,7 @@ from dynident.effects.position_lines import PositionLines
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.model_columns import joint_columns
+from dynident.robot import Robot
 
 
 def line_width(evidence: Evidence, effect: Effect) -> float | None:
@@ -28,9 +29,21 @@ def line_width(evidence: Evidence, effect: Effect) -> float | None:
 
 
 def shapes_tried(evidence: Evidence, effect: Effect) -> int:
-    """Return how many shapes of an effect count as tried: of its grid, and lines in a spectrum."""
+    """Return how many shapes of an effect count as tried within its grid, lines among them."""
     found = _looked_for(evidence, effect)
     return sum(1 for _ in effect.variants(evidence.model.robot)) if found is None else found.tried
+
+
+def lines_beyond(evidence: Evidence, effect: Effect) -> int:
+    """Return how many lines beyond its grid a spectrum could name."""
+    found = _looked_for(evidence, effect)
+    return 0 if found is None else found.beyond
+
+
+def is_beyond(effect: Effect, robot: Robot) -> bool:
+    """Whether an effect has the shape of a line beyond its grid."""
+    limits = effect.lines_over_position(robot)
+    return limits is not None and effect.shape[0] > effect.shape_parameters(robot)[0].grid[-1]
 
 
 def lines(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> tuple[Effect, ...]:
