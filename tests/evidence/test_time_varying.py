@@ -98,6 +98,22 @@ def test_changes_far_slower_than_the_session_are_one_ramp(warm: float) -> None:
     assert abs(score(wider, gain, beside, own, 1).drop) < 0.02 * true
 
 
+def test_friction_of_a_joint_that_warms_up_is_known_as_well_as_is_said() -> None:
+    """Noise of encoders in the columns, times the whole torque, had been errors of many sigma."""
+    hidden = at_shoulder("thermal_friction", true_model()).shaped(20.0)
+    model = true_model() + hidden
+    known = {"Fv__shoulder": 1.2, "Fv__elbow": 1.0, "Fc__elbow": 1.5, "Fvt__shoulder": 0.8}
+    true, off = true_values(model, **known), []
+    for seed in range(20):
+        made = synthetic(
+            model, true, seed, duration=16.0, rate_hz=100.0, position_std=1e-4, torque_std=0.05
+        )
+        evidence = Evidence(model, gather(Dataset((made,))))
+        found = fit_evidence(evidence, model)
+        off.append((found.values - true)[-2:] / np.sqrt(np.diag(found.covariance))[-2:])
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
 @pytest.mark.parametrize("seed", [0, 1001, 1017, 1041])
 def test_a_torque_that_does_not_drift_is_not_said_to(seed: int) -> None:
     evidence, found = fitted(seed)

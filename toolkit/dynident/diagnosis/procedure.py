@@ -146,7 +146,7 @@ def diagnose(
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, settled.judging, path)
     found = replace(found, notes=(*found.notes, *alike_notes(found)))
-    return with_filter_doubt(with_geometry_doubt(found, settled.evidence.runs), train)
+    return with_filter_doubt(with_geometry_doubt(found, settled.evidence.runs), train, held_out)
 
 
 def _compare(

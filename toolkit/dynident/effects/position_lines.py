@@ -22,6 +22,8 @@ _BINS = 8
 """Bins of position in the shortest wave: what lies in one is out of phase by 45 degrees at most."""
 _BETWEEN = 4
 """Values of the spectrum for each line that can be told from its neighbours."""
+_MOVING = 1e-3
+"""Of its highest speed, with which a joint moves at least."""
 _LONGEST = 250.0
 """Travel in m or rad beyond which no spectrum is taken: it would fill the memory, and a length that
 long is more likely one in mm."""
@@ -51,7 +53,8 @@ class PositionLines:
     ) -> PositionLines | None:
         """Return where lines are looked for along a motion.
 
-        Beyond the grid no further than rows can show them that are as fast as half of all.
+        Beyond the grid no further than rows can show them that are as fast as half of those in
+        which the joint moves: at a thousandth of its highest speed and more.
 
         Parameters
         ----------
@@ -69,8 +72,9 @@ class PositionLines:
         if limits is None or not 0 < travel <= _LONGEST:
             return None
         grid = effect.shape_parameters(robot)[0].grid
-        usual = max(float(np.median(np.abs(v))), np.finfo(float).tiny)
-        shown = max(grid[-1], math.pi * rate_hz / usual)
+        speed = np.abs(v)
+        moving = speed[speed > _MOVING * speed.max()]
+        shown = max(grid[-1], math.pi * rate_hz / float(np.median(moving))) if len(moving) else 0.0
         low, high = limits[0], min(limits[1], shown)
         return cls(effect=effect, grid=grid, low=low, high=high, width=math.pi / travel)
 

@@ -21,7 +21,12 @@ from dynident.evidence.runs import Run
 from dynident.evidence.time_varying import steady, time_varying_columns
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicates import TimeVarying, time_varying_products
+from dynident.moments.replicates import (
+    TimeVarying,
+    instrumental_values,
+    time_varying_products,
+    with_torque_again,
+)
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import (
     MomentSolution,
@@ -130,11 +135,11 @@ class EvidenceFit:
         repeats = any(joints[0].stack.kind == "repeated" for joints in self.white)
         if self.model.is_time_varying or not repeats:
             return self
-        found = []
-        for joints in self.white:
-            apart = joints if joints[0].stack.kind == "repeated" else ()
-            found.append(_with_next(joints, [steady(one.dense()) for one in apart]))
-        summed = SecondMoments.stacked(found)
+        parts = [
+            [steady(one.dense()) for one in joints] if joints[0].stack.kind == "repeated" else []
+            for joints in self.white
+        ]
+        summed = _with_next(self.white, parts)
         pooled = summed.pooled()
         solution = regress(pooled, self.criteria.noise.reliable)
         values = _near_description(self.model, solution.values, pooled)
@@ -436,32 +441,41 @@ def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMom
 
 def _of_the_session(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
     """Moments of a model of which some columns depend on the time, see `_with_next`."""
-    return SecondMoments.stacked(
+    parts = [
         [
-            _with_next(
-                joints,
-                [
-                    time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
-                    for j, w in enumerate(joints)
-                ]
-                if stack.kind == "repeated"
-                else (),
-            )
-            for stack, joints in zip(evidence.stacks, white, strict=True)
+            time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
+            for j, w in enumerate(joints)
         ]
-    )
+        if stack.kind == "repeated"
+        else []
+        for stack, joints in zip(evidence.stacks, white, strict=True)
+    ]
+    return _with_next(white, parts)
 
 
-def _with_next(joints: Sequence[WhiteColumns], own: Sequence[TimeVarying]) -> SecondMoments:
+def _with_next(white: White, parts: Sequence[Sequence[TimeVarying]]) -> SecondMoments:
     """Moments with the next repetition as the instrument of each; of other recordings, as ever.
 
     Products of all repetitions tell the same in the mean. But of a column that hardly changes with
     the time, beside its like that does not, the difference of two estimates would be all there is.
+
+    Parameters
+    ----------
+    white : columns and the torque of each stack of runs, of each joint.
+    parts : the same with their instruments; nothing for a stack that does not repeat.
     """
-    found, edges = WhiteColumns.moments(joints), joints[0].stack.runs[0].edges
-    if not own:
-        return found
-    return found.with_signal(np.sum([time_varying_products(x, x, edges) for x in own], axis=0))
+    values, found = None, []
+    for joints, own in zip(white, parts, strict=True):
+        here, edges = WhiteColumns.moments(joints), joints[0].stack.runs[0].edges
+        if own:
+            if values is None:
+                values = instrumental_values([one for part in parts for one in part])
+            about = (one.about(values) for one in own)
+            products = np.sum([time_varying_products(x, x, edges) for x in about], axis=0)
+            half = with_torque_again(products, values).swapaxes(1, 2)
+            here = here.with_signal(with_torque_again(half, values).swapaxes(1, 2))
+        found.append(here)
+    return SecondMoments.stacked(found)
 
 
 def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:

@@ -136,6 +136,6 @@ def drift_in_words(drifts: Sequence[Drift]) -> str:
     ]
     return (
         "Repetitions differ the more, the longer they lie apart: something drifts in the course of "
-        "a recording, such as friction that warms up or the zero of a sensor, or noise is slower "
-        f"than a repetition. It counts as noise: {listed(each)}."
+        "a recording, such as friction that warms up or the zero of a sensor, or noise is slow "
+        f"beside a repetition. It counts as noise: {listed(each)}."
     )

@@ -16,6 +16,9 @@ import numpy as np
 
 from dynident.moments.second_moments import SecondMoments
 
+_RANK = 1e-9
+"""Of the largest direction of scaled columns, below which values are not sought."""
+
 Kind = Literal["repeated", "noise_augmented", "single"]
 """How the replicates of a signal come about: repetitions of a period; the measured record followed
 by copies to which the stated noise was added once more; or one record, of unknown noise."""
@@ -106,6 +109,45 @@ class TimeVarying:
     columns: np.ndarray
     instruments: np.ndarray
     is_torque: np.ndarray
+
+    def about(self, values: np.ndarray) -> TimeVarying:
+        """Return columns before the torque with what values (p,) of them leave of it in its place.
+
+        Products with it are those of the instruments alone, and hold no noise of the columns times
+        the whole torque.
+        """
+        left = self.columns[..., -1:] - (self.columns[..., :-1] @ values)[..., None]
+        return TimeVarying(
+            np.concatenate([self.columns[..., :-1], left], axis=3),
+            np.concatenate([self.instruments[..., :-1], np.roll(left, -1, axis=1)], axis=3),
+            self.is_torque,
+        )
+
+
+def instrumental_values(every: Sequence[TimeVarying]) -> np.ndarray:
+    """Values (p,) of columns before the torque that leave nothing of it in any instrument.
+
+    Parameters
+    ----------
+    every : the same columns of several joints and recordings.
+    """
+    gram, cross = 0.0, 0.0
+    for one in every:
+        columns = one.columns.reshape(-1, one.columns.shape[3])
+        instruments = one.instruments.reshape(columns.shape)[:, :-1]
+        gram = gram + instruments.T @ columns[:, :-1]
+        cross = cross + instruments.T @ columns[:, -1]
+    size = np.sqrt(np.abs(np.diag(gram)))
+    scale = 1.0 / np.where(size > 0, size, 1.0)
+    scaled = np.asarray(gram) * scale[:, None] * scale
+    return scale * np.linalg.lstsq(scaled, scale * cross, rcond=_RANK)[0]
+
+
+def with_torque_again(products: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Products (R B, p + 1, k) with the torque, of those with what values (p,) leave of it."""
+    found = np.array(products)
+    found[:, -1] += values @ products[:, :-1]
+    return found
 
 
 def time_varying_products(left: TimeVarying, right: TimeVarying, edges: np.ndarray) -> np.ndarray:

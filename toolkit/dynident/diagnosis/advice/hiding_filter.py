@@ -9,13 +9,13 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.recording import Dataset, suited_instead
 
 
-def with_filter_doubt(found: Diagnosis, train: Dataset) -> Diagnosis:
+def with_filter_doubt(found: Diagnosis, train: Dataset, test: Dataset | None) -> Diagnosis:
     """Return a diagnosis that doubts the filter, where something is left that it may have made.
 
     Parameters
     ----------
     found : the diagnosis.
-    train : the training recordings.
+    train, test : the recordings, to all of which one filter is to suit; `test` may be None.
 
     Returns
     -------
@@ -24,7 +24,8 @@ def with_filter_doubt(found: Diagnosis, train: Dataset) -> Diagnosis:
     cutoff = None if train.filter is None else train.filter.position_cutoff_hz
     if found.wiring or found.verdict != "unexplained" or not cutoff:
         return found
-    suited = suited_instead(cutoff, train.recordings)
+    every = (*train.recordings, *(() if test is None else test.recordings))
+    suited = suited_instead(cutoff, every)
     if suited is None:
         return found
     hiding = HidingFilter(cutoff_hz=cutoff, suited_hz=suited)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Set
 from dataclasses import replace
 
 from dynident.diagnosis.extension.extending import extend, rank_stage, tried, with_one_more
@@ -10,7 +10,7 @@ from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.selection import AddedEffect, choose
+from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -112,7 +112,7 @@ def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage
 
 
 def _beside_another(
-    start: Stage, begun: AddedEffect, straight: Collection[str], task: DiagnosisTask
+    start: Stage, begun: AddedEffect, straight: Set[str], task: DiagnosisTask
 ) -> Stage | None:
     """Return the model with an effect, and what is significant beside it.
 
@@ -122,11 +122,11 @@ def _beside_another(
     if refused:
         return None
     ranked = rank_stage(with_it, task)
-    best = choose(ranked.evidence, ranked.fitted, ranked.rounds[-1])
-    if best is None or best.score.effect.label in straight:
+    if all(one.effect.label in straight for one in ranked.rounds[-1].passing):
         return None
     pair = with_one_more(ranked, task)
-    return pair if pair.proposals == 2 else None
+    new = {one.score.effect.label for one in pair.found} - {begun.score.effect.label}
+    return pair if pair.proposals == 2 and not new & straight else None
 
 
 def _from(start: Stage, ranking: Ranking) -> Stage:

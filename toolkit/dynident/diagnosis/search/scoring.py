@@ -22,7 +22,7 @@ from dynident.evidence.time_varying import (
     time_varying_variants,
 )
 from dynident.model import Model, not_met
-from dynident.moments.replicates import time_varying_products
+from dynident.moments.replicates import time_varying_products, with_torque_again
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import eigenvectors
 
@@ -124,7 +124,9 @@ def candidate_moments(
                 old = time_varying_columns(evidence, fitted.model, stack, joint, noise, dense)
                 if variants[0].linear_in_torque:
                     new = of_the_torque(new, old, fitted.values)
-                one[-1] = one[-1].with_signal(time_varying_products(old, new, edges))
+                known_values = fitted.beside(variants[0]).values
+                products = time_varying_products(old.about(known_values), new, edges)
+                one[-1] = one[-1].with_signal(with_torque_again(products, known_values))
                 products = time_varying_products(new, new, edges)
                 apart = products.reshape(-1, len(variants), width, len(variants), width)
                 two[-1] = two[-1].with_signal(np.einsum("bvivj->bvij", apart))
