@@ -26,8 +26,7 @@ _GOES_ON = 1.0 + 1e-3
 go on: along a direction that tells nothing it would leave for shapes that are another law."""
 _AT_END = 2.0
 """Precisions from an end of a bracket within which the best lies beyond it."""
-AS_MUCH = float(chdtri(1, 0.05))
-"""Squared, whitened residual that one shape must explain more than another to be told from it."""
+_AS_MUCH = float(chdtri(1, 0.05))
 
 
 @dataclass(frozen=True)
@@ -98,9 +97,27 @@ def refined(
                 return better
             objective = replace(objective, one=better)
     found = _by_trial(objective)
-    if one.effect.time_varying and found.drop - objective.one.drop < AS_MUCH:
+    if found.drop - objective.one.drop < untold(evidence, one.effect):
         return objective.one
     return _better(objective.one, found)
+
+
+def untold(evidence: Evidence, effect: Effect) -> float:
+    """Return how much less a shape may explain than the best one and be taken all the same.
+
+    Where a motion repeats, the noise that repetitions tell holds what changes with the time, and
+    how long the change takes is told afterwards, when it is in the model.
+
+    Parameters
+    ----------
+    evidence, effect : the recordings, and what is sought.
+
+    Returns
+    -------
+    Squared, whitened residual; zero but for changes in time where a motion repeats.
+    """
+    repeats = any(run.kind == "repeated" for run in evidence.runs)
+    return _AS_MUCH if effect.time_varying and repeats else 0.0
 
 
 def _better(one: Score, *others: Score) -> Score:

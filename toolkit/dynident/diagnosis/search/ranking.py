@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.criteria import SearchCriteria
-from dynident.diagnosis.search.candidate_shapes import AS_MUCH, refined
+from dynident.diagnosis.search.candidate_shapes import refined, untold
 from dynident.diagnosis.search.cross_validation import (
     cross_validate,
     helps_on_blocks,
@@ -38,9 +38,10 @@ from dynident.moments.replicates import Kind
 
 _ALIKE = 1e-10
 """Share of the squared residual by which scores of the same differ, as they are rounded."""
-_BEYOND = 0.1
+_BEYOND = 0.01
 """Share of all chances of a false effect that lines beyond the grids of ripples have: hundreds of
-them, which few robots have, are not to make the others less significant (weighted Bonferroni)."""
+them, which few robots have, are not to make the others less significant (weighted Bonferroni). Such
+a line is sharp: where there is one, it is significant all the same."""
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -154,7 +155,7 @@ def rank(
         within = sum(not is_beyond(one.effect, fitted.model.robot) for one in tried)
         tests += max(within, shapes_tried(evidence, effect))
         beyond += lines_beyond(evidence, effect)
-        best.append(_best_of(tried))
+        best.append(_best_of(tried, untold(evidence, effect)))
     tests += math.ceil(_BEYOND * tests) if beyond else 0
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
@@ -252,16 +253,21 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
         yield _possible(score(fitted, shaped, *parts, grid=grid), evidence, fitted)
 
 
-def _best_of(tried: list[Score]) -> Score:
+def _best_of(tried: list[Score], untold: float) -> Score:
     """The score of the best shape; of a change in time, the least change that explains as much.
 
     A session that is short beside a change shows a ramp, whatever the time that the change takes:
     the longer that is, the larger are the values of the same ramp.
+
+    Parameters
+    ----------
+    tried : scores of one effect.
+    untold : how much less another shape may explain.
     """
     best = max(tried, key=lambda s: s.penalised)
-    if not best.effect.time_varying or not best.penalised > 0:
+    if not untold > 0 or not best.penalised > 0:
         return best
-    as_much = (one for one in tried if best.penalised - one.penalised < AS_MUCH)
+    as_much = (one for one in tried if best.penalised - one.penalised < untold)
     return min(as_much, key=lambda one: np.linalg.norm(one.values))
 
 
