@@ -103,7 +103,7 @@ def _by_two_at_once(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage
         if pair is None or set(pair.doubtful) != doubtful or not _is_enough(pair):
             continue
         both = _without_its_first(pair, task)
-        alike = set(both.doubtful) == doubtful
+        alike = set(both.doubtful) == doubtful and _is_relevant(both)
         if alike and _is_enough(both) and _is_enough_for_others(both):
             # As many beginnings are as many searches.
             found = (replace(f, p_value=min(1.0, number * f.p_value)) for f in both.found)
@@ -147,6 +147,12 @@ def _without_its_first(stage: Stage, task: DiagnosisTask) -> Stage:
     rest = fit_evidence(stage.evidence, stage.fitted.model - effect, stage.fitted)
     without = replace(stage, fitted=rest, found=tuple(others), refused={})
     return extend(rank_stage(without, task), task)
+
+
+def _is_relevant(stage: Stage) -> bool:
+    """Whether the effect that comes first explains what a first one has to."""
+    least = stage.evidence.criteria.gates.first_share
+    return bool(stage.found) and stage.found[0].score.share >= least
 
 
 def _leaves_a_residual(start: Stage, extended: Stage) -> bool:

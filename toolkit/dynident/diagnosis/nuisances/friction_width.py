@@ -36,8 +36,6 @@ _AROUND = np.array([0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 _OTHER = 0.2
 """Change of such a width, as a logarithm, that sampling and noise of the drive do not make: less of
 it has to be worth it by far."""
-_HOPE = 0.5
-"""Of its price that a width has to promise for its profile to be looked at more closely."""
 _CLEARLY = 3.0
 """Times its price that a width brings which is worth it by far: its profile needs no other fit."""
 
@@ -285,38 +283,15 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     grid = grid[(grid > np.log(own.narrowest_width * stated)) | (_AROUND == 1.0)]
     values = [missed(x) for x in grid]
     k = int(np.argmin(values))
-    # The width has to bring it: the shapes alone may have been short of their best.
-    same = values[int(np.argmin(np.abs(grid - np.log(width))))]
     bounds = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])
-    hoped = min(same, fitted.error_signal) - _foretold(grid, values)
-    if hoped > _HOPE * _price(fitted):
-        options = {"xatol": 0.02, "maxiter": 12}
-        minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
-    best = min(tried)
+    minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 0.02, "maxiter": 12})
+    # The width has to bring it: the shapes alone may have been short of their best.
+    best, same = min(tried), values[int(np.argmin(np.abs(grid - np.log(width))))]
     change = abs(np.log(tried[best].model.friction_widths[at] / width))
     price = _price(fitted) * (1.0 if change > _OTHER else _CLEARLY)
     if min(same, fitted.error_signal) - best > price:
         return tried[best]
     return tried[same] if fitted.error_signal - same > _price(fitted) else fitted
-
-
-def _foretold(x: np.ndarray, values: Sequence[float]) -> float:
-    """The least of a profile by the parabola through the least of some values and its neighbours.
-
-    Parameters
-    ----------
-    x : where they were taken, rising.
-    values : of the profile.
-
-    Returns
-    -------
-    Minus infinity where the least stands at an end.
-    """
-    k = int(np.argmin(values))
-    if not 0 < k < len(x) - 1:
-        return -np.inf
-    curvature, slope, _ = np.polyfit(x[k - 1 : k + 2] - x[k], np.array(values[k - 1 : k + 2]), 2)
-    return values[k] - slope**2 / (4.0 * curvature)
 
 
 def _price(fitted: EvidenceFit) -> float:
