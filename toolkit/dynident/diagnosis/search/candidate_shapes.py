@@ -27,6 +27,7 @@ go on: along a direction that tells nothing it would leave for shapes that are a
 _AT_END = 2.0
 """Precisions from an end of a bracket within which the best lies beyond it."""
 _AS_MUCH = float(chdtri(1, 0.05))
+"""Squared, whitened residual by which one shape is told from another (95 %)."""
 
 
 @dataclass(frozen=True)
