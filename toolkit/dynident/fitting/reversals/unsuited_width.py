@@ -24,6 +24,9 @@ from dynident.tables import listed, number
 _CLEARLY = 4.0
 """Standard errors of the change of a width from which it is no chance: of healthy arms' joints 3 is
 the most that was seen."""
+_SMALLER = 3.0
+"""Times that errors which hang together from row to row may make sigma smaller; they make it larger
+but where quickly alternating errors cancel."""
 _FAR = 0.2  # part of a secant from which a width is far off: the tangent sees what is nearer
 _MATTERS = 2.0  # standard errors that a Coulomb friction is off by, from which an interval fails
 _ENOUGH = 100_000  # samples that tell a width: more would double the time of a long fit
@@ -78,7 +81,7 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
         given = estimate if some is dataset else method.fit(model, some)
         # One after the other: together each would take a part of what the other shows.
         for columns in (slopes, secants):
-            found = found or _unsuited(given, method.fit(_wider(model, columns), some), columns)
+            found = found or _unsuited_by(columns, given, some, method)
     if not found:
         return estimate
     headline = (
@@ -90,13 +93,25 @@ def with_unsuited_width(estimate: Estimate, dataset: Dataset, method: LeastSquar
     return replace(estimate, headline=headline)
 
 
-def _wider(model: Model, columns: Sequence[WidthSlope]) -> Model:
-    """The model with the derivatives of its friction by widths as columns more."""
-    return replace(model, effects=(*model.effects, *columns))
+def _unsuited_by(
+    columns: Sequence[WidthSlope], given: Estimate, dataset: Dataset, method: LeastSquares
+) -> list[_Unsuited]:
+    """Joints whose width does not suit by a derivative, or a secant, as a column more of each.
+
+    Rows that hang together cost most of a fit. It is spared where sigma of rows that do not, from
+    the same values, is so large that theirs could not be small enough.
+    """
+    wider = replace(given.model, effects=(*given.model.effects, *columns))
+    textbook = replace(method, errors="independent").fit(wider, dataset)
+    if not _unsuited(given, textbook, columns, _CLEARLY / _SMALLER):
+        return []
+    return _unsuited(given, method.fit(wider, dataset), columns, _CLEARLY)
 
 
-def _unsuited(given: Estimate, wide: Estimate, columns: Sequence[WidthSlope]) -> list[_Unsuited]:
-    """Joints whose width does not suit, by a fit with columns more."""
+def _unsuited(
+    given: Estimate, wide: Estimate, columns: Sequence[WidthSlope], clearly: float
+) -> list[_Unsuited]:
+    """Joints whose width does not suit by so many sigma, by a fit with columns more."""
     model, robot, found = given.model, given.model.robot, []
     with np.errstate(divide="ignore", invalid="ignore"):
         change = wide.values / wide.sigma
@@ -106,7 +121,7 @@ def _unsuited(given: Estimate, wide: Estimate, columns: Sequence[WidthSlope]) ->
         joint, at = str(one.joint), wide.model.slices[one.label].start
         j, z = robot.names.index(joint), float(change[at])
         is_little = isinstance(one, WidthSecant) and abs(wide.values[at]) < _FAR
-        if abs(z) > _CLEARLY and abs(levels[j]) > _MATTERS and not is_little:
+        if abs(z) > clearly and abs(levels[j]) > _MATTERS and not is_little:
             width = f"{number(float(model.friction_widths[j]), 2)} {robot.units[j]}/s"
             found.append(_Unsuited(joint, width, z))
     return found
