@@ -113,7 +113,7 @@ def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[Disturbance
     left, found = list(data), []
     while len(found) < criteria.contacts.most:
         best = _best(left, criteria)
-        if best is None or best.p_value >= criteria.contacts.level:
+        if best is None:
             break
         found.append(best)
         left = [_cleared(one, best) for one in left]
@@ -150,7 +150,7 @@ def without(run: Run, pulses: Sequence[DisturbancePulse], criteria: ContactCrite
 
 
 def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | None:
-    """The most significant pulse, whether it is or not."""
+    """The most significant pulse; None where none is."""
     by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
     found, positions = [], 0
     for series in by_joint.values():
@@ -164,7 +164,10 @@ def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | No
     if not found:
         return None
     best = min(found)
-    return _refined(best, min(1.0, best.chance * positions), criteria.contacts)
+    p_value = min(1.0, best.chance * positions)
+    if p_value >= criteria.contacts.level:
+        return None
+    return _refined(best, p_value, criteria.contacts)
 
 
 def _looked_at(peak: _PulsePlace, series: Sequence[Repeated], criteria: Criteria) -> _PulsePlace:
