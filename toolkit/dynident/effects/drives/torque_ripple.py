@@ -14,6 +14,24 @@ from dynident.effects.effect import (
 )
 
 _MOST_IN_A_TURN = 500.0
+_PER_TURN = ShapeParameter(
+    "k",
+    "1/rev",
+    tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2))),
+    lower=1.0,
+    upper=_MOST_IN_A_TURN,
+    means="ripples per revolution",
+)
+# As close as lines of a quarter of a metre's travel are wide, 25 rad/m: over a longer one, what lies
+# between is looked for in a spectrum.
+_PER_METRE = ShapeParameter(
+    "k",
+    "rad/m",
+    tuple(float(k) for k in range(30, 3001, 10)),
+    lower=10.0,
+    upper=1e5,
+    means="phase of the ripple per metre",
+)
 
 
 class TorqueRipple(JointEffect):
@@ -44,29 +62,14 @@ class TorqueRipple(JointEffect):
         )
 
     def shape_parameters(self, robot):
-        if motion_unit(robot, self.joint) == "m":
-            # As close as lines of a quarter of a metre's travel are wide, 25 rad/m: over a longer
-            # one, what lies between is looked for in a spectrum.
-            grid = tuple(float(k) for k in range(30, 3001, 10))
-            return (
-                ShapeParameter(
-                    "k", "rad/m", grid, lower=10.0, upper=1e5, means="phase of the ripple per metre"
-                ),
-            )
-        grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
-        return (
-            ShapeParameter(
-                "k", "1/rev", grid, lower=1.0, upper=_MOST_IN_A_TURN, means="ripples per revolution"
-            ),
-        )
+        return (_PER_METRE if motion_unit(robot, self.joint) == "m" else _PER_TURN,)
 
     def lines_over_position(self, robot):
-        grid = self.shape_parameters(robot)[0].grid
         if motion_unit(robot, self.joint) == "m":
-            return grid[0], grid[-1]
+            return _PER_METRE.grid[0], _PER_METRE.grid[-1]
         # In a turn, what teeth and magnets make comes a whole number of times: the grid has them
         # all, but for those of a gear's fast side, which comes round some hundred times.
-        return grid[-1], _MOST_IN_A_TURN
+        return _PER_TURN.grid[-1], _MOST_IN_A_TURN
 
     def at_joint(self, block: Block) -> np.ndarray:
         phase = self.shape[0] * block.q[:, [block.index(self.joint)]]
