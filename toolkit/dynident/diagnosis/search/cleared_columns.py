@@ -9,6 +9,7 @@ import numpy as np
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import (
+    EXACT,
     MomentSolution,
     eigenvectors,
     orthonormal_directions,
@@ -83,3 +84,48 @@ def cleared(
     return Cleared(
         directions=directions, part=part, moment=moment, back=back, left_total=left_total
     )
+
+
+def drops_at_most(
+    fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
+) -> np.ndarray:
+    """Return about what each of many sets of columns would drop, or more, all at once.
+
+    As `cleared`, but for directions that the model has nearly: there it may be more. Which of many
+    shapes are worth a closer look does not hang on them.
+
+    Parameters
+    ----------
+    fitted : the model without the columns.
+    with_model : of all columns, set by set, with the model's and the torque, (p + 1, V k).
+    with_self : of each set's columns with themselves, (V, k, k).
+
+    Returns
+    -------
+    (V,) of the squared, whitened, noise-free residual; infinite where numbers are not finite.
+    """
+    p, known = len(fitted.values), fitted.pooled
+    sets, k = with_self.total.shape[:2]
+    both = with_model.total, with_model.signal
+    if not all(np.all(np.isfinite(one)) for one in (*both, with_self.total, with_self.signal)):
+        return np.full(sets, np.inf)
+    every = fitted.solution.project(with_model.signal[:p])
+    back, signal, total = (
+        np.moveaxis(one.reshape(p, sets, k), 1, 0)
+        for one in (every, with_model.signal[:p], with_model.total[:p])
+    )
+    back_t = np.swapaxes(back, 1, 2)
+    left_signal = with_self.signal - np.swapaxes(signal, 1, 2) @ back
+    cross = back_t @ total
+    left_total = with_self.total - cross - np.swapaxes(cross, 1, 2) + back_t @ (known.gram @ back)
+    moment = (with_model.signal[p] - every.T @ known.signal[:p, p]).reshape(sets, k)
+    scale = np.sqrt(np.clip(np.diagonal(left_total, axis1=1, axis2=2), 0.0, None))
+    scale = np.where(scale > 0, scale, 1.0)
+    size, axes = np.linalg.eigh(left_total / (scale[:, :, None] * scale[:, None, :]))
+    kept = size > EXACT * np.maximum(size[:, -1:], 1e-300)
+    white = axes * (kept / np.sqrt(np.where(kept, size, 1.0)))[:, None, :] / scale[:, :, None]
+    white_t = np.swapaxes(white, 1, 2)
+    reliability, turn = np.linalg.eigh(white_t @ left_signal @ white)
+    along = np.einsum("vij,vjk,vk->vi", np.swapaxes(turn, 1, 2), white_t, moment)
+    good = reliability > fitted.criteria.noise.reliable
+    return np.sum(np.where(good, along**2 / np.where(good, reliability, 1.0), 0.0), axis=1)

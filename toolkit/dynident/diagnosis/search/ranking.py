@@ -21,6 +21,7 @@ from dynident.diagnosis.search.scoring import (
     candidate_moments,
     impossible,
     moments_with_payload,
+    price,
     score,
 )
 from dynident.diagnosis.search.shapes.residual_lines import (
@@ -42,6 +43,7 @@ _BEYOND = 0.01
 """Share of all chances of a false effect that lines beyond the grids of ripples have: hundreds of
 them, which few robots have, are not to make the others less significant (weighted Bonferroni). Such
 a line is sharp: where there is one, it is significant all the same."""
+_ROUGHLY = 0.1  # by which a shape may explain more than all shapes at once say
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -151,8 +153,9 @@ def rank(
             best.append(Score(effect=effect, payload_recordings=None, not_identifiable=False))
             continue
         progress(effect.label)
-        tried = list(_score_variants(evidence, fitted, effect))
-        within = sum(not is_beyond(one.effect, fitted.model.robot) for one in tried)
+        shapes = _shapes(evidence, fitted, effect)
+        tried = list(_score_variants(evidence, fitted, effect, shapes))
+        within = sum(not is_beyond(one, fitted.model.robot) for one in shapes) or len(tried)
         tests += max(within, shapes_tried(evidence, effect))
         beyond += lines_beyond(evidence, effect)
         best.append(_best_of(tried, untold(evidence, effect)))
@@ -234,23 +237,39 @@ def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str
     return frozenset(found)
 
 
-def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
+def _shapes(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> list[Effect]:
+    """An effect with the shapes of its grid, those found before, and lines; none of a payload."""
+    if effect.is_payload:
+        return []
+    seen = _seen(fitted, effect)
+    shapes = [variant.suited(seen) for variant in effect.variants(fitted.model.robot)]
+    # Found before, where no variant may be near enough.
+    before = [effect] if effect.point else []
+    return list(dict.fromkeys([*shapes, *before, *lines(evidence, fitted, effect)]))
+
+
+def _score_variants(
+    evidence: Evidence, fitted: EvidenceFit, effect: Effect, shapes: Sequence[Effect]
+) -> Iterator[Score]:
+    """Score an effect with shapes, but for those that cannot be the best; in their order."""
     if effect.is_payload:
         for one in payload_scores(evidence, fitted, effect):
             yield _possible(one, evidence, fitted)
         return
-    seen = _seen(fitted, effect)
-    shapes = [variant.suited(seen) for variant in effect.variants(fitted.model.robot)]
-    if effect.point:
-        # Found before, where no variant may be near enough.
-        shapes = list(dict.fromkeys([*shapes, effect]))
-    count = max(len(shapes), shapes_tried(evidence, effect))
-    more, robot = lines_beyond(evidence, effect), fitted.model.robot
-    shapes = list(dict.fromkeys([*shapes, *lines(evidence, fitted, effect)]))
-    found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
-    for shaped, parts in zip(shapes, found, strict=True):
-        grid = count + more if is_beyond(shaped, robot) else count
-        yield _possible(score(fitted, shaped, *parts, grid=grid), evidence, fitted)
+    robot, count = fitted.model.robot, shapes_tried(evidence, effect) + bool(effect.point)
+    more = lines_beyond(evidence, effect)
+    grid = [count + more if is_beyond(one, robot) else count for one in shapes]
+    moments = candidate_moments(evidence, fitted, shapes, evidence.first_look)
+    most = (1.0 + _ROUGHLY) * moments.drops_at_most(fitted.beside(effect))
+    most -= price(fitted, effect, 1, np.array(grid))
+    found, best = {}, -np.inf
+    for v in np.argsort(-most, kind="stable").tolist():
+        if most[v] < best - untold(evidence, effect):
+            break
+        scored = score(fitted, shapes[v], *moments[v], grid=grid[v])
+        found[v] = _possible(scored, evidence, fitted)
+        best = max(best, found[v].penalised)
+    yield from (found[v] for v in sorted(found))
 
 
 def _best_of(tried: list[Score], untold: float) -> Score:
@@ -382,11 +401,12 @@ def _like_noise(
     A column of noisy positions explains their noise, also on held-out data. Along the simulated
     motion, which knows nothing of that noise, it explains nothing unless something is missing.
     """
-    tried = list(_score_variants(free, fitted, effect))
+    shapes = _shapes(free, fitted, effect)
+    tried = list(_score_variants(free, fitted, effect, shapes))
     best = max(tried, key=lambda each: each.penalised)
     if best.penalised > -np.inf:
         best = _confirm(free, fitted, best)
-    why = _refusal(best, free, fitted, tests + len(tried), least)
+    why = _refusal(best, free, fitted, tests + len(shapes), least)
     return f"along the simulated motion, which has no noise of positions: {why}" if why else ""
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
+from typing import Any
 
 import numpy as np
 from scipy import special
 
-from dynident.diagnosis.search.cleared_columns import cleared
+from dynident.diagnosis.search.cleared_columns import cleared, drops_at_most
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -80,12 +80,38 @@ class Score:
         return self.drop * (1.0 - (1.0 - self.effect.point[0] / self.values[0]) ** 2)
 
 
+@dataclass(frozen=True, eq=False)
+class CandidateMoments(Sequence[tuple[SecondMoments, SecondMoments]]):
+    """Moments of V variants of an effect, each of k columns; of each variant, both kinds.
+
+    Attributes
+    ----------
+    beside : of the columns of all variants with the model's and the torque, (B, p + 1, V k).
+    own : of each variant's columns with themselves, (B, V, k, k).
+    """
+
+    beside: SecondMoments
+    own: SecondMoments
+
+    def __len__(self) -> int:
+        return self.own.total.shape[1]
+
+    def __getitem__(self, place):
+        width = self.own.total.shape[2]
+        columns = slice(place * width, (place + 1) * width)
+        return self.beside.columns(columns), self.own.at(range(len(self))[place])
+
+    def drops_at_most(self, fitted: EvidenceFit) -> np.ndarray:
+        """About what each variant would drop, or more, (V,): which are worth a closer look."""
+        return drops_at_most(fitted, self.beside.pooled(), self.own.pooled())
+
+
 def candidate_moments(
     evidence: Evidence,
     fitted: EvidenceFit,
     variants: Sequence[Effect],
     columns_of: Columns | None = None,
-) -> list[tuple[SecondMoments, SecondMoments]]:
+) -> CandidateMoments:
     """Moments of columns with the model's and the torque, and with themselves.
 
     A payload counts as carried in every run; see `moments_with_payload`.
@@ -132,10 +158,7 @@ def candidate_moments(
                 two[-1] = two[-1].with_signal(np.einsum("bvivj->bvij", apart))
         with_model.append(reduce(add, one))
         with_self.append(reduce(add, two))
-    beside, own = SecondMoments.stacked(with_model), SecondMoments.stacked(with_self)
-    return [
-        (beside.columns(slice(v * width, (v + 1) * width)), own.at(v)) for v in range(len(variants))
-    ]
+    return CandidateMoments(SecondMoments.stacked(with_model), SecondMoments.stacked(with_self))
 
 
 def moments_with_payload(
@@ -203,9 +226,7 @@ def score(
     combination = np.append(-fitted.values, 1.0)
     with_model_columns = (combination @ fitted.pooled.total)[:p]
     with_noise = combination @ total - with_model_columns @ back
-    shapes = len(effect.shape_parameters(fitted.model.robot))
-    price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * math.log(grid)
-    penalised = drop - price
+    penalised = drop - price(fitted, effect, part.rank, grid)
     blocks = _block_scores(fitted, with_model, with_self, back, values) @ directions @ part.basis
     return Score(
         effect=effect,
@@ -221,6 +242,24 @@ def score(
         covariance=covariance,
         fall=float(2.0 * at @ with_noise - at @ left_total @ at),
     )
+
+
+def price(fitted: EvidenceFit, effect: Effect, rank: int, grid: int | np.ndarray) -> Any:
+    """Return what an effect has to explain at least to count for something.
+
+    Parameters
+    ----------
+    fitted : the model without it.
+    effect : with its shapes.
+    rank : number of its parameters that the data can tell.
+    grid : number of shapes that were tried, of one or of each of many.
+
+    Returns
+    -------
+    Squared, whitened residual.
+    """
+    shapes = len(effect.shape_parameters(fitted.model.robot))
+    return (rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
 
 
 def _seen(effect: Effect, fitted: EvidenceFit, scale: np.ndarray) -> np.ndarray:
