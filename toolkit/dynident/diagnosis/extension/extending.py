@@ -32,19 +32,21 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 
 
-def rank_stage(stage: Stage, task: DiagnosisTask) -> Stage:
+def rank_stage(stage: Stage, task: DiagnosisTask, worth: float = 0.0) -> Stage:
     """Rank every effect that the model lacks; drop alternatives that are significant beside it.
 
     Parameters
     ----------
     stage : the model as far as it is extended.
     task : what is asked.
+    worth : share of the misfit from which an effect is looked at more closely.
 
     Returns
     -------
     With one ranking more.
     """
-    ranking = rank(stage.evidence, stage.fitted, len(stage.found), task.progress)
+    added = len(stage.found)
+    ranking = rank(stage.evidence, stage.fitted, added, task.progress, worth=worth)
     ranking = ranking.refusing(stage.refused)
     found = tuple(
         alternatives_only(one, ranking) if one in stage.latest else one for one in stage.found

@@ -18,6 +18,9 @@ from dynident.evidence.held_out import on_recordings
 
 _MUCH_LESS = 0.5
 """Of what a model leaves, beyond the noise, that another must not leave to take its place."""
+_MOST_OF_IT = 0.25
+"""Part of what one effect leaves that another has to explain, with a shape of its grid, if nothing
+is to be left of both: with its best shape it explains several times as much at most."""
 _WAYS = 4  # that are gone at most, each from another effect of the first round
 
 
@@ -121,7 +124,7 @@ def _beside_another(
     with_it, refused = tried(start, begun, task)
     if refused:
         return None
-    ranked = rank_stage(with_it, task)
+    ranked = rank_stage(with_it, task, worth=_MOST_OF_IT)
     if all(one.effect.label in straight for one in ranked.rounds[-1].passing):
         return None
     pair = with_one_more(ranked, task)

@@ -253,7 +253,7 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     """The fit with another width at one joint, sought together with other dry friction's shapes.
 
     Stribeck friction many times too large takes the part of a narrower width: with either held the
-    other has its best value, and both are wrong.
+    other has its best value, and both are wrong. So do shapes that are speeds, and no others.
     """
     model, robot = fitted.model, fitted.model.robot
     own, at = evidence.criteria.nuisances, robot.names.index(joint)
@@ -261,8 +261,8 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     labels = [
         e.label
         for e in model.effects
-        if e.joint == joint and e.reverses and e.shape_parameters(robot)
-        if not (e.needs_recording or e.time_varying)
+        if e.joint == joint and e.reverses and not (e.needs_recording or e.time_varying)
+        if any(shape.unit == f"{robot.units[at]}/s" for shape in e.shape_parameters(robot))
     ]
     if not labels:
         return fitted

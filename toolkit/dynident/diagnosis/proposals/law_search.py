@@ -62,11 +62,12 @@ class LawSearch:
         free = (name for name in names if name not in known)
         for name in islice(free, self.evidence.criteria.proposals.most):
             starts = list(self._from(fitted))
-            every = [(self._best(one, before, name, len(starts)), one) for one in starts]
-            tried = [(best, self._with(best.effect, one)) for best, one in every if best]
+            every = (self._best(one, before, name, len(starts)) for one in starts)
+            tried = [best for best in every if best is not None]
             if not tried:
                 return
-            best, wider = min(tried, key=lambda one: one[1].misfit(fitted))
+            best = min(tried, key=lambda one: one.wider.misfit(fitted))
+            wider = best.wider
             after = self._judged(wider)
             proposal = self._proposal(best, (fitted, wider), (before, after))
             if proposal is None:
@@ -90,21 +91,20 @@ class LawSearch:
         criteria = self.evidence.criteria.proposals
         joints = self._joints(fitted, before)
         terms = {j: self._terms(fitted, before, j) for j in joints}
-        metric, best = fitted, None
-        seen: Effect | None = None
+        metric: EvidenceFit = fitted
+        best: _BestLaws | None = None
         for _ in range(criteria.rounds):
             looked_at, tried = self._looked_at(metric, terms)
             tried *= searches
-            passing = self._confirmed(metric, looked_at, tried, name)
+            passing = tuple(self._confirmed(metric, looked_at, tried, name))
             if not passing:
                 break
-            best = _BestLaws(scores=tuple(passing), tried=tried)
             first = passing[0].effect
-            # The refit seeks its shapes anew: from near ones it makes the same metric again.
-            if seen is not None and _alike(first, seen):
-                break
-            seen = first
+            # The refit seeks its shapes anew: from near ones it makes the same fit again.
+            if best is not None and _alike(first, best.effect):
+                return replace(best, scores=passing, tried=tried)
             wider = self._with(first, fitted)
+            best = _BestLaws(scores=passing, tried=tried, wider=wider)
             metric = in_metric_of(self.evidence, fitted, wider)
         return best
 
@@ -249,10 +249,12 @@ class _BestLaws:
     ----------
     scores : of them.
     tried : terms behind them.
+    wider : fit of the model with the best of them.
     """
 
     scores: tuple[Score, ...]
     tried: int
+    wider: EvidenceFit
 
     @property
     def effect(self) -> LawEffect:

@@ -124,6 +124,7 @@ def rank(
     progress: Callable[[str], None] = lambda _: None,
     only: tuple[Effect, ...] = (),
     least: float | None = None,
+    worth: float = 0.0,
 ) -> Ranking:
     """Score every candidate on a model.
 
@@ -134,6 +135,8 @@ def rank(
     progress : is called with what is being done, for a display.
     only : candidates, where not the whole catalogue is meant.
     least : share of the squared residual that they must explain; None for that of the criteria.
+    worth : share of the misfit that an effect has to explain to be looked at more closely: what
+        explains less is not cross-validated.
 
     Returns
     -------
@@ -163,6 +166,7 @@ def rank(
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
     hopeful = [i for i in order if _may_win(best[i], tests, criteria.search)]
+    hopeful = [i for i in hopeful if best[i].drop >= worth * fitted.error_signal]
     for i in hopeful[: len(only) or criteria.search.contenders]:
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
