@@ -373,6 +373,14 @@ class ProposalCriteria(CriteriaGroup):
     least_share: float = criterion(
         0.1, "1", "share of the systematic square that a law takes at least", over=0, most=1
     )
+    changes: float = criterion(
+        1e-4,
+        "1",
+        "p value of the hypothesis that a law changes with what it depends on as it says, below "
+        "which it is not enough",
+        over=0,
+        most=1,
+    )
     replacing_share: float = criterion(
         0.98,
         "1",

@@ -10,6 +10,7 @@ import numpy as np
 
 from dynident.criteria import ProposalCriteria
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
+from dynident.diagnosis.proposals.law_changes import change_p_value
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
@@ -29,6 +30,7 @@ from dynident.tables import number
 
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3
+_CHANGES = "What it leaves still changes with the same signals: another form of it would do better."
 _CLASS = 10  # rows of a class in the picture, at least
 
 
@@ -208,20 +210,23 @@ class LawSearch:
         own = wider.model.slices[label]
         estimate = estimate_of(self.evidence, wider, self.train)
         shapes = {one.name: one.sigma for one in estimate.shapes}
+        as_it_says = change_p_value(self.evidence, wider, effect) >= criteria.changes
+        remarks = (_remark(effect), "" if as_it_says else _CHANGES, _other_widths(fitted, wider))
+        enough = explains >= criteria.explains and as_it_says
         return Proposal(
             effect=_recentred(effect),
             values=tuple(wider.values[own].tolist()),
             sigma=tuple(estimate.sigma[own].tolist()),
             shape_sigma=tuple(shapes[name] for name in wider.model.shape_names[label]),
             explains=float(explains),
-            is_explanation=explains >= criteria.explains and self._nothing_left(after),
+            is_explanation=enough and self._nothing_left(after),
             p_value=min(1.0, best.scores[0].p_value * best.tried),
             tried=best.tried,
             test_error_before=before.error,
             test_error_after=after.error,
             noise_floor=after.floor,
             rivals=best.rivals(criteria),
-            remark=" ".join(filter(None, (_remark(effect), _other_widths(fitted, wider)))),
+            remark=" ".join(filter(None, remarks)),
             picture=_picture(before, after, fitted, str(effect.joint)),
         )
 

@@ -42,7 +42,8 @@ class Proposal:
     shape_sigma : (s,) of the shapes.
     explains : share of the systematic squared residual that it takes off, at all joints.
     is_explanation : whether it is enough for these recordings: it is the only law that is proposed,
-        takes most, and nothing but noise is left on held-out data, as far as that is known.
+        takes most, what is left does not change with what the law depends on, and nothing but noise
+        is left on held-out data, as far as that is known.
     p_value : of the hypothesis that it has no part beside the model, at the friction widths that
         `remark` may say, times the number of terms tried.
     tried : how many terms that were.

@@ -22,8 +22,8 @@ _PER_TURN = ShapeParameter(
     upper=_MOST_IN_A_TURN,
     means="ripples per revolution",
 )
-# As close as lines of a quarter of a metre's travel are wide, 25 rad/m: over a longer one, what lies
-# between is looked for in a spectrum.
+# As close as lines of a quarter of a metre's travel are wide, 25 rad/m: over a longer one, what
+# lies between is looked for in a spectrum.
 _PER_METRE = ShapeParameter(
     "k",
     "rad/m",

@@ -17,7 +17,7 @@ from dynident.errors import FitError, RecordingError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.uncertainty.shape_slopes import WidthSecant, WidthSlope, width_slope
-from dynident.model import Model, coulomb_levels, dry_joints
+from dynident.model import coulomb_levels, dry_joints
 from dynident.recording import Dataset
 from dynident.tables import listed, number
 
