@@ -153,13 +153,17 @@ def analyse(
 
 
 def _ahead(here: Posterior, prior: Gamma | None, known: np.ndarray) -> Posterior:
-    """Where the best leap of any degree ends; here where none gains."""
+    """Where the longest of the leaps ends that gain more than those before it.
+
+    What a leap gains grows with its degree until it goes too far: then a longer one gains nothing.
+    """
     best, highest = here, here.bound(prior)
     with np.errstate(all="ignore"):
         for there in _leaps(here, prior, known, _FAR):
             bound = there.bound(prior)
-            if highest < bound < np.inf:
-                best, highest = there, bound
+            if not highest < bound < np.inf:
+                break
+            best, highest = there, bound
     return best
 
 
