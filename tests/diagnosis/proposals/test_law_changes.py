@@ -28,16 +28,25 @@ def p_value(made, torque: str, shape: dict[str, float]) -> float:
     return change_p_value(evidence, fit_evidence(evidence, model), effect)
 
 
-def test_what_a_right_law_leaves_is_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of forty none is below the level; of few blocks, p values are a few times too small."""
+@pytest.mark.parametrize("runs", [1, 2])
+@pytest.mark.parametrize("torque", ["c*v*q", "c*v*q*v[shoulder]"])
+def test_what_a_right_law_leaves_is_noise(
+    torque: str, runs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of sixty none is below the level, though of few blocks too many are small."""
     monkeypatch.setattr(laws_hidden, "NOISE", 0.0)
-    made, found = recordings({"c*v*q[shoulder]": 0.5}), []
-    for seed in range(40):
-        noise = NOISE * np.random.default_rng([seed, 7]).normal(size=(3, *made[0].tau.shape))
+    made, found = recordings({torque: 0.5})[:runs], []
+    for seed in range(60):
+        noise = NOISE * np.random.default_rng([seed, 7]).normal(size=(runs, *made[0].tau.shape))
         noisy = [one.replace(tau=one.tau + more) for one, more in zip(made, noise, strict=True)]
-        found.append(p_value(noisy, "c*v*q[shoulder]", {}))
-    assert min(found) > DEFAULTS.proposals.changes
-    assert np.median(found) > 0.1
+        found.append(p_value(noisy, torque, {}))
+    assert min(found) > DEFAULTS.proposals.changes_level
+    assert np.mean(np.array(found) < 0.1) < 0.4
+
+
+def test_laws_of_what_is_predicted_are_not_asked() -> None:
+    """The load is that of the model without them: what is left of it goes with the law as well."""
+    assert p_value(recordings({"c*v*load": 0.05}), "c*v*load", {}) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -52,7 +61,7 @@ def test_what_an_imitation_leaves_goes_with_its_signals(
     hidden: str, imitation: str, shape: dict[str, float]
 ) -> None:
     p = p_value(recordings({hidden: 1.0}), imitation, shape)
-    assert p < 0.01 * DEFAULTS.proposals.changes
+    assert p < DEFAULTS.proposals.changes_level
 
 
 def test_a_law_of_another_form_is_not_enough() -> None:

@@ -373,11 +373,13 @@ class ProposalCriteria(CriteriaGroup):
     least_share: float = criterion(
         0.1, "1", "share of the systematic square that a law takes at least", over=0, most=1
     )
-    changes: float = criterion(
-        1e-4,
+    changes_level: float = criterion(
+        1e-5,
         "1",
-        "p value of the hypothesis that a law changes with what it depends on as it says, below "
+        "p value of the hypothesis that what a law leaves does not change with its signals, below "
         "which it is not enough",
+        "measured: of few blocks of time such p values are too small; right laws of a simulated "
+        "arm fell below it in 3 of 1200 recordings",
         over=0,
         most=1,
     )

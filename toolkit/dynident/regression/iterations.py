@@ -153,7 +153,7 @@ def analyse(
 
 
 def _ahead(here: Posterior, prior: Gamma | None, known: np.ndarray) -> Posterior:
-    """Where the longest of the leaps ends that gain more than those before it.
+    """Where the last leap ends before one that gains no more; here where the first does not.
 
     What a leap gains grows with its degree until it goes too far: then a longer one gains nothing.
     """

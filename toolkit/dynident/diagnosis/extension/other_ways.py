@@ -19,8 +19,10 @@ from dynident.evidence.held_out import on_recordings
 _MUCH_LESS = 0.5
 """Of what a model leaves, beyond the noise, that another must not leave to take its place."""
 _MOST_OF_IT = 0.25
-"""Part of what one effect leaves that another has to explain, with a shape of its grid, if nothing
-is to be left of both: with its best shape it explains several times as much at most."""
+"""Part of what one effect leaves that another has to explain, with a shape of its grid, to be
+looked at more closely: with its best shape it would have to explain nearly all. What lies far
+between the shapes of its grid, a ripple that does not come a whole number of times a turn, is not
+found so."""
 _WAYS = 4  # that are gone at most, each from another effect of the first round
 
 

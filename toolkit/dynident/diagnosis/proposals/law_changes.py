@@ -1,30 +1,32 @@
-"""Whether the torque of a law changes with what it depends on in another way than the law says.
+"""Whether what a law leaves changes with the positions, speeds and accelerations that are in it.
 
 A law outside of the library is imitated by one of it: a saturation by a sign, a step by waves. What
-such a law leaves goes with the same positions, speeds and loads.
+such a law leaves goes with the same signals.
 """
 
 from __future__ import annotations
 
-import re
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from dynident.diagnosis.search.scoring import candidate_moments, score
-from dynident.effects import Effect, LawEffect, law_effect
-from dynident.errors import EffectError
+from dynident.effects import Block, JointEffect, LawEffect, Parameter
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.formulas import Signal, quoted_joint
+from dynident.formulas import Signal
 
-_NAME = "changes"
-_OF_A_SPEED = ("{}", "abs({})", "{}^2")
-_OF_OTHERS = ("{}", "{}^2")
+_NOT_ASKED = frozenset(("load", "t", "temperature"))
+"""Signals that a model predicts, with an error of its own, and those that no motion repeats."""
 
 
 def change_p_value(evidence: Evidence, fitted: EvidenceFit, effect: LawEffect) -> float:
-    """P value of the hypothesis that a law does not change with its own signals.
+    """P value of the hypothesis that what a law leaves does not change with the law's signals.
 
-    The torque of the law, as it was found, times each of them and its square, and times the
-    absolute value of a speed, are columns more; the test is that of every effect.
+    The torque of the law, as it was found, times one of them, its square, or the absolute value of
+    a speed, is a column more, one after the other: all at once they would be too many for blocks of
+    time to tell their covariance. The test is that of every effect, times their number.
 
     Parameters
     ----------
@@ -33,34 +35,45 @@ def change_p_value(evidence: Evidence, fitted: EvidenceFit, effect: LawEffect) -
 
     Returns
     -------
-    1 where the data do not tell such columns.
+    1 for laws of the load, the time or the temperature, which are not asked.
     """
-    changes = _changes(fitted, effect)
-    if changes is None:
+    if effect.made_of.quantities & _NOT_ASKED:
         return 1.0
-    (parts,) = candidate_moments(evidence, fitted, [changes])
-    return score(fitted, changes, *parts, grid=1).p_value
+    values = tuple(fitted.values[fitted.model.slices[effect.label]].tolist())
+    found = []
+    for signal in effect.made_of.signals:
+        for function in ("itself", "square", *(["size"] if signal.quantity == "v" else [])):
+            change = _Change(
+                effect.joint, of=effect, values=values, signal=signal, function=function
+            )
+            (parts,) = candidate_moments(evidence, fitted, [change])
+            found.append(score(fitted, change, *parts, grid=1).p_value)
+    return min(1.0, len(found) * min(found, default=1.0))
 
 
-def _changes(fitted: EvidenceFit, effect: LawEffect) -> Effect | None:
-    """The law times functions of its signals; None where that is too long for a formula."""
-    law, values = effect.made_of, fitted.values[fitted.model.slices[effect.label]].tolist()
-    functions = [
-        text.format(_written(signal))
-        for signal in law.signals
-        for text in (_OF_A_SPEED if signal.quantity == "v" else _OF_OTHERS)
-    ]
-    sum_ = " + ".join(f"d{k}*{text}" for k, text in enumerate(functions, 1))
-    known = dict(zip(law.linear, (f"{x:.12g}" for x in values), strict=True))
-    name = re.compile(rf"\b({'|'.join(map(re.escape, known))})\b(?![^\[]*\])")
-    torque = name.sub(lambda found: f"({known[found[0]]})", law.torque)
-    try:
-        found = type(law)(name=_NAME, torque=f"({torque})*({sum_})", shape=law.shape)
-        return law_effect(found)(effect.joint, shape=effect.shape).on(fitted.model.robot)
-    except EffectError:
-        return None
+@dataclass(frozen=True)
+class _Change(JointEffect):
+    """The torque of a law times a function of one of its signals.
 
+    Attributes
+    ----------
+    of, values : the law, and its coefficients.
+    signal, function : of which it is, and which.
+    """
 
-def _written(signal: Signal) -> str:
-    place = "" if signal.joint is None else f"[{quoted_joint(signal.joint)}]"
-    return f"{signal.quantity}{place}"
+    of: LawEffect | None = None
+    values: tuple[float, ...] = ()
+    signal: Signal | None = None
+    function: str = ""
+    name: ClassVar[str] = "change of a law"
+    in_catalogue: ClassVar[bool] = False
+
+    def parameters(self, robot):
+        return (Parameter("d", "1"),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        assert self.of is not None
+        assert self.signal is not None
+        x = np.asarray(self.of.signal(self.signal, block))
+        factor = {"itself": x, "square": x**2, "size": np.abs(x)}[self.function]
+        return (self.of.at_joint(block) @ np.array(self.values) * factor)[:, None]

@@ -210,7 +210,7 @@ class LawSearch:
         own = wider.model.slices[label]
         estimate = estimate_of(self.evidence, wider, self.train)
         shapes = {one.name: one.sigma for one in estimate.shapes}
-        as_it_says = change_p_value(self.evidence, wider, effect) >= criteria.changes
+        as_it_says = change_p_value(self.evidence, wider, effect) >= criteria.changes_level
         remarks = (_remark(effect), "" if as_it_says else _CHANGES, _other_widths(fitted, wider))
         enough = explains >= criteria.explains and as_it_says
         return Proposal(

@@ -89,10 +89,10 @@ def cleared(
 def drops_at_most(
     fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
 ) -> np.ndarray:
-    """Return about what each of many sets of columns would drop, or more, all at once.
+    """Return what each of many sets of columns would drop, all at once.
 
-    As `cleared`, but for directions that the model has nearly: there it may be more. Which of many
-    shapes are worth a closer look does not hang on them.
+    As `cleared`, but for directions that the model has nearly, where it may be more, and for those
+    that are unreliable, where it may be a little less.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ def _best_drop(evidence: Evidence, fitted: EvidenceFit, name: str) -> float:
     """
     robot = fitted.model.robot
     every = [e.on(robot) for e in catalogue()[name].candidates(robot) if e.joint is not None]
-    each = [candidate_moments(evidence, fitted, [effect])[0] for effect in every]
+    each = [candidate_moments(evidence, fitted, [effect]).of(0) for effect in every]
     choices = payload_choices(evidence.runs, evidence.criteria.search.payload_recordings)
     price = 2.0 * math.log(max(2 ** len(evidence.runs) - 2, 1))
     most = -np.inf

@@ -43,7 +43,9 @@ _BEYOND = 0.01
 """Share of all chances of a false effect that lines beyond the grids of ripples have: hundreds of
 them, which few robots have, are not to make the others less significant (weighted Bonferroni). Such
 a line is sharp: where there is one, it is significant all the same."""
-_ROUGHLY = 0.1  # by which a shape may explain more than all shapes at once say
+_ROUGHLY = 0.1
+"""By which a shape may explain more than `drops_at_most` says, where directions are unreliable; of
+robots' recordings 1e-10 is the most that was seen."""
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -158,6 +160,7 @@ def rank(
         progress(effect.label)
         shapes = _shapes(evidence, fitted, effect)
         tried = list(_score_variants(evidence, fitted, effect, shapes))
+        # A payload has no shapes, and recordings that may carry it in their place.
         within = sum(not is_beyond(one, fitted.model.robot) for one in shapes) or len(tried)
         tests += max(within, shapes_tried(evidence, effect))
         beyond += lines_beyond(evidence, effect)
@@ -270,7 +273,7 @@ def _score_variants(
     for v in np.argsort(-most, kind="stable").tolist():
         if most[v] < best - untold(evidence, effect):
             break
-        scored = score(fitted, shapes[v], *moments[v], grid=grid[v])
+        scored = score(fitted, shapes[v], *moments.of(v), grid=grid[v])
         found[v] = _possible(scored, evidence, fitted)
         best = max(best, found[v].penalised)
     yield from (found[v] for v in sorted(found))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import Any
 
 import numpy as np
 from scipy import special
@@ -81,8 +80,8 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class CandidateMoments(Sequence[tuple[SecondMoments, SecondMoments]]):
-    """Moments of V variants of an effect, each of k columns; of each variant, both kinds.
+class CandidateMoments:
+    """Moments of V variants of an effect, each of k columns; one after the other, both kinds.
 
     Attributes
     ----------
@@ -93,13 +92,14 @@ class CandidateMoments(Sequence[tuple[SecondMoments, SecondMoments]]):
     beside: SecondMoments
     own: SecondMoments
 
-    def __len__(self) -> int:
-        return self.own.total.shape[1]
+    def __iter__(self) -> Iterator[tuple[SecondMoments, SecondMoments]]:
+        return (self.of(place) for place in range(self.own.total.shape[1]))
 
-    def __getitem__(self, place):
+    def of(self, place: int) -> tuple[SecondMoments, SecondMoments]:
+        """Return the moments of one variant's columns with the model's, and with themselves."""
         width = self.own.total.shape[2]
         columns = slice(place * width, (place + 1) * width)
-        return self.beside.columns(columns), self.own.at(range(len(self))[place])
+        return self.beside.columns(columns), self.own.at(place)
 
     def drops_at_most(self, fitted: EvidenceFit) -> np.ndarray:
         """About what each variant would drop, or more, (V,): which are worth a closer look."""
@@ -244,7 +244,9 @@ def score(
     )
 
 
-def price(fitted: EvidenceFit, effect: Effect, rank: int, grid: int | np.ndarray) -> Any:
+def price(
+    fitted: EvidenceFit, effect: Effect, rank: int, grid: int | np.ndarray
+) -> float | np.ndarray:
     """Return what an effect has to explain at least to count for something.
 
     Parameters

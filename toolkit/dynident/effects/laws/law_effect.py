@@ -127,6 +127,10 @@ class LawEffect(JointEffect):
         columns = [found.column(one) for one in self.made_of.columns]
         return np.stack(columns, axis=1)
 
+    def signal(self, signal: Signal, block: Block) -> Any:
+        """What the formula takes of a block for one of its signals, (T,)."""
+        return _BlockValues(self, block).signal(signal)
+
     def require_finite(self, columns: np.ndarray, block: Block) -> None:
         """See `Effect.require_finite`."""
         finite = np.isfinite(columns).all(axis=(1, 2))
