@@ -17,7 +17,6 @@ import tomlkit
 
 import dynident as di
 from dynident.diagnosis import Diagnosis
-from dynident.experiment_design.column_function import is_of_an_instant
 from dynident.experiment_design.written_design import DESIGN, DesignFile
 from dynident.explorer import explore
 from dynident.explorer.local_access import ADDRESS
@@ -182,7 +181,7 @@ def test_what_is_left_open_comes_with_the_command_that_designs(tmp_path, diagnos
     decided = replace(diagnosis, steps=(replace(step, indistinguishable=()),))
     hidden = [one.effect for one in diagnosis.candidates if one.status == "absorbed"]
     server = explore(study, decided)
-    assert ("cannot: " in shown(server)) == any(map(is_of_an_instant, hidden))
+    assert ("cannot: " in shown(server)) == any(one.is_of_an_instant for one in hidden)
     server.stop()
     server = explore(study, undecided)
     text = shown(server)

@@ -13,9 +13,10 @@ from dynident.reporting.content import left
 from dynident.reporting.glossary import meaning, use_of
 from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
-from dynident.reporting.joint_states import joint_errors, opened, states
+from dynident.reporting.joint_states import opened, states
 from dynident.reporting.next_steps import next_steps
 from dynident.reporting.packing import packed
+from dynident.reporting.pictures.joint_errors import joint_errors
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import unpacked
 

@@ -163,10 +163,10 @@ class NextRecording:
 
     def advised(self, diagnosis: Diagnosis) -> Diagnosis:
         """The diagnosis, with the designed recording in the place of advice in words."""
-        from dynident.experiment_design.open_questions import with_designed_advice
-
         if self.design is None:
             return diagnosis
+        from dynident.experiment_design.open_questions import with_designed_advice
+
         return with_designed_advice(diagnosis, self.design)
 
     def parts(self):

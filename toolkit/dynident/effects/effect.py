@@ -186,6 +186,12 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         """
         return ()
 
+    @property
+    def is_of_an_instant(self) -> bool:
+        """Whether its torque is a function of the motion at an instant, and of nothing else."""
+        past = self.needs_recording or self.is_payload or self.time_varying
+        return self.found_by == "residual" and not past
+
     def lines_over_position(self, robot: Robot) -> tuple[float, float] | None:
         """Limits of its one shape where that is the phase of a wave per unit of the position.
 

@@ -21,8 +21,6 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run, gather, resimulated
 from dynident.fitting.history import Ending
-from dynident.fitting.instrumental import IV, SimulatedLoop
-from dynident.fitting.instrumental.source import Guess
 from dynident.model import Model
 from dynident.recording import Dataset
 
@@ -113,6 +111,8 @@ def motion_of_loop(
         note = "The loop is not simulated for instruments: not every recording has q_ref."
         return SimulatedMotion(notes=(note,))
 
+    from dynident.fitting.instrumental import IV, SimulatedLoop  # which loads the simulator
+
     def report(what: str, done: float, total: float) -> None:
         progress(f"{what}, {100 * done / total:.0f} %" if total else what)
 
@@ -143,6 +143,9 @@ def motion_of_loop(
 def _simulated(
     controller: Controller, model: Model, values: np.ndarray, measured: Dataset
 ) -> Dataset:
+    from dynident.fitting.instrumental import SimulatedLoop
+    from dynident.fitting.instrumental.source import Guess
+
     # Believed are the inertias of these very values: the gains are the real loop's, as stated.
     source = SimulatedLoop(controller).prepare(model, measured, Guess(values, (values,)))
     return source.at(values)

@@ -6,9 +6,6 @@ bodies are and how far they stay apart, `motion_program` which motion tells the 
 `recording_design` what comes of it.
 """
 
-from dynident.experiment_design.design_task import DesignTask
-from dynident.experiment_design.designing import design
-from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.recording_design import RecordingDesign
+import lazy_loader
 
-__all__ = ["DesignTask", "MotionLimits", "RecordingDesign", "design"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -124,12 +124,6 @@ class ColumnFunction:
         return np.array(self.torque(np.hstack([q, v, a, t[:, None]]).T)).T
 
 
-def is_of_an_instant(effect: Effect) -> bool:
-    """Whether an effect's torque depends on nothing but the motion at an instant."""
-    held = effect.needs_recording or effect.is_payload or effect.found_by == "repetition"
-    return not (held or effect.time_varying)
-
-
 def _robot(model: Model, values: np.ndarray) -> Robot:
     rigid = values[: model.base.rank]
     return model.robot.with_theta(model.base.lift(rigid, model.robot.theta))
@@ -169,7 +163,7 @@ def _payload_columns(robot: Robot, x: Any) -> Any:
 
 def _effect_columns(model: Model, effect: Effect, robot: Robot, x: Any, torque: Any) -> Any:
     """Columns of an effect, (n, k)."""
-    if not is_of_an_instant(effect):
+    if not effect.is_of_an_instant:
         remedy = "leave it out: what depends on the past or the hour is not designed for"
         raise DesignError("its torque is no function of an instant", effect.label, remedy)
     if effect.needs_bodies:

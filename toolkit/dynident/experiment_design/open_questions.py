@@ -5,39 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynident.diagnosis import Diagnosis
-from dynident.diagnosis.advice.experiments import NO_MOTION
-from dynident.effects import Effect
-from dynident.experiment_design.column_function import is_of_an_instant
+from dynident.diagnosis.advice.experiments import DESIGNED, NO_MOTION
+from dynident.diagnosis.advice.open_groups import open_groups
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.experiment_design.telling.separation import Separation
 
-DESIGNED = "record the motion that was designed"
-"""How advice begins that is a designed recording."""
 ADVISED = 2.0
 """Standard deviations below which a recording is not worth advising."""
-
-
-def open_groups(diagnosis: Diagnosis) -> tuple[tuple[Effect, ...], ...]:
-    """Return each effect that was added with those that explain the recordings as well.
-
-    Only such as the design of a recording knows: whose torque is a function of an instant.
-
-    Parameters
-    ----------
-    diagnosis : of the recordings so far.
-    """
-    added = {step.effect.label for step in diagnosis.steps}
-    found = []
-    for step in diagnosis.steps:
-        rivals = tuple(
-            one
-            for one in step.indistinguishable
-            if one.label not in added and is_of_an_instant(one)
-        )
-        if rivals and is_of_an_instant(step.effect):
-            found.append((step.effect, *rivals))
-    return tuple(found)
 
 
 def open_task(diagnosis: Diagnosis, task: DesignTask) -> DesignTask | None:
@@ -61,7 +36,7 @@ def open_task(diagnosis: Diagnosis, task: DesignTask) -> DesignTask | None:
     hidden = tuple(
         one.effect
         for one in diagnosis.candidates
-        if one.status == "absorbed" and is_of_an_instant(one.effect)
+        if one.status == "absorbed" and one.effect.is_of_an_instant
     )
     return replace(task, tell=(), show=hidden) if hidden else None
 

@@ -30,11 +30,12 @@ from dynident.reporting.diagnosis_tables import (
 from dynident.reporting.glossary import glossary, use_of
 from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
-from dynident.reporting.joint_states import State, joint_errors, opened, states
+from dynident.reporting.joint_states import State, opened, states
 from dynident.reporting.loop_page import LoopSection, loop_section
 from dynident.reporting.next_steps import FIRST, THIS_REPORT, Advice, next_steps, of_study
 from dynident.reporting.packing import compressed, packed
 from dynident.reporting.pictures import diagnosis_pictures as pictures
+from dynident.reporting.pictures.joint_errors import joint_errors
 from dynident.reporting.switch_page import switch_section
 from dynident.tables import Table, number, percent
 from dynident.validation.loop_errors import QUANTITIES

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dynident.diagnosis.advice.experiments import NO_MOTION
+from dynident.diagnosis.advice.experiments import DESIGNED, NO_MOTION
+from dynident.diagnosis.advice.open_groups import open_groups
 from dynident.diagnosis.details import Step
 from dynident.diagnosis.effect_groups import grouped_title, in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
-from dynident.experiment_design.column_function import is_of_an_instant
-from dynident.experiment_design.open_questions import DESIGNED, open_groups
 from dynident.fitting.reversals.standing_joints import width_advice
 from dynident.reporting.headline import headline
 from dynident.reporting.joint_states import states
@@ -390,7 +389,7 @@ def _to_repeat(diagnosis: Diagnosis) -> Advice:
     if diagnosis.noise_source == "given":
         why = f"The noise is so far only what the study states. {why}"
     if diagnosis.too_fast is not None or not all(
-        map(is_of_an_instant, diagnosis.before.model.effects)
+        one.is_of_an_instant for one in diagnosis.before.model.effects
     ):
         return Advice(what, why)
     why += " `design` makes one within the limits that the description states, or usual ones."

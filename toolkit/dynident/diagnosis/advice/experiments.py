@@ -18,6 +18,8 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.tables import percent
 
+DESIGNED = "record the motion that was designed"
+"""How advice begins that is a designed recording."""
 NO_MOTION = "no motion of"
 """How advice begins that names no recording, as there is none."""
 _ROUNDING = 1e-6

@@ -6,19 +6,6 @@ carries the noise of encoders and torque. Janot, Vandanjon and Gautier, "An inst
 approach for rigid industrial robots identification" (preprint 2010).
 """
 
-from dynident.fitting.history import Convergence, Ending, Round
-from dynident.fitting.instrumental.estimator import IV
-from dynident.fitting.instrumental.measured_instruments import Filtered, SwappedPeriods
-from dynident.fitting.instrumental.simulated_loop import SimulatedLoop
-from dynident.fitting.instrumental.source import Instruments
+import lazy_loader
 
-__all__ = [
-    "IV",
-    "Convergence",
-    "Ending",
-    "Filtered",
-    "Instruments",
-    "Round",
-    "SimulatedLoop",
-    "SwappedPeriods",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
