@@ -416,7 +416,10 @@ class ProposalCriteria(CriteriaGroup):
     )
     contenders: int = criterion(12, "laws", "laws of each screening that are looked at", least=1)
     seeds: int = criterion(
-        6, "laws", "products of two factors of each screening that a third is tried with", least=0
+        12, "laws", "products of two factors of each screening that a third is tried with", least=0
+    )
+    exchanged: int = criterion(
+        6, "laws", "products of three factors of which each is exchanged for others", least=0
     )
     rounds: int = criterion(3, "1", "screenings, each in the metric of the last law", least=1)
     most: int = criterion(3, "laws", "laws that are proposed one after the other", least=1)

@@ -12,7 +12,13 @@ from dynident.criteria import ProposalCriteria
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.proposals.law_changes import change_p_value
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
-from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
+from dynident.diagnosis.proposals.term_library import (
+    LibraryTerm,
+    centred,
+    extended,
+    library,
+    pairs_within,
+)
 from dynident.diagnosis.proposals.term_screen import Screened, screen
 from dynident.diagnosis.search.cross_validation import signed_rank
 from dynident.diagnosis.search.path import judged_on
@@ -154,18 +160,42 @@ class LawSearch:
         for joint, some in terms.items():
             self.progress(f"laws at {metric.model.robot.names[joint]}")
             repeating = [one for one in some if not one.of_session]
-            kept: tuple[Screened, ...] = screen(self.evidence, metric, joint, repeating)
-            # Whatever a product of three is, some product of two of them is like it.
-            seeds = [one.term for one in kept[: criteria.seeds]]
-            wider = extended(seeds, [one.factors[0] for one in some if len(one.factors) == 1])
-            if wider:
-                kept = (*kept, *screen(self.evidence, metric, joint, wider, beside=len(repeating)))
-            tried += len(some) + len(wider)
-            found += [(one.penalised, joint, one.term) for one in kept]
+            kept = screen(self.evidence, metric, joint, repeating)
+            wider, more = self._of_three(metric, joint, some, kept)
+            tried += len(some) + more
+            found += [(one.penalised, joint, one.term) for one in (*kept, *wider)]
         found = _best_start(found)
         session = [(j, one) for j, some in terms.items() for one in some if one.of_session]
         best = [(joint, term) for _, joint, term in found[: criteria.contenders]]
         return best + session, tried
+
+    def _of_three(
+        self,
+        metric: EvidenceFit,
+        joint: int,
+        library: Sequence[LibraryTerm],
+        kept: Sequence[Screened],
+    ) -> tuple[list[Screened], int]:
+        """Products of three factors, best first: of the best of two, then by exchanging factors.
+
+        Whatever a product of three is, some product of two of them is like it; but not always one
+        of the right two. So the best products of three give the next seeds, each less one factor.
+        """
+        criteria = self.evidence.criteria.proposals
+        factors = [one.factors[0] for one in library if len(one.factors) == 1]
+        seeds = [one.term for one in kept[: criteria.seeds]]
+        found: list[Screened] = []
+        tried: set[LibraryTerm] = set()
+        while new := [one for one in extended(seeds, factors) if one not in tried]:
+            before = found[0].penalised if found else 0.0
+            beside = len(library) + len(tried)
+            found += screen(self.evidence, metric, joint, new, beside=beside)
+            found.sort(key=lambda one: -one.penalised)
+            tried.update(new)
+            if not found or found[0].penalised <= before:
+                break
+            seeds = pairs_within([one.term for one in found[: criteria.exchanged]])
+        return found, len(tried)
 
     def _confirmed(
         self,

@@ -3,14 +3,15 @@
 Of three there are too many: they are made of the best products of two.
 
 Factors are of four sorts: position, motion, load, and the time of the session. Those of one term
-are of different sorts, but for products of two joints' speeds or positions.
+are of different sorts, but for products of two joints' speeds or positions, waves among them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import combinations, product
+from dataclasses import dataclass, replace
+from itertools import chain, combinations, product
+from math import prod
 from typing import Literal
 
 from dynident.effects import Law
@@ -18,8 +19,10 @@ from dynident.formulas import quoted_joint
 from dynident.robot import Robot
 
 Sort = Literal["position", "motion", "load", "session"]
+_ORDER: tuple[Sort, ...] = ("motion", "position", "load", "session")  # of factors in a term
 HARMONICS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 """Frequencies of sines of the position, rad per rad or m; between them they are sought."""
+_FREQUENCIES = ("k", "m")  # names of their shapes, of the first wave in a term and of the second
 _REACH = 1.0  # of a frequency, to both sides
 _LOWEST = 0.25
 _DECAY = (0.02, 0.1, 0.5)  # rad/s or m/s, of an exponential of the speed
@@ -67,7 +70,7 @@ class LibraryTerm:
 
     Attributes
     ----------
-    factors : at most one of them has several columns.
+    factors : where several have more than one column, each of one goes with each of the others.
     """
 
     factors: tuple[Factor, ...]
@@ -75,7 +78,7 @@ class LibraryTerm:
     @property
     def size(self) -> int:
         """Number of columns."""
-        return max(len(one.texts) for one in self.factors)
+        return prod(len(one.texts) for one in self.factors)
 
     @property
     def price(self) -> int:
@@ -97,7 +100,8 @@ class LibraryTerm:
         single = [one.formulas()[0] for one in self.factors if len(one.texts) == 1]
         several = [one.formulas() for one in self.factors if len(one.texts) > 1]
         if several:
-            sum_ = " + ".join(f"c{k}*{text}" for k, text in enumerate(several[0], 1))
+            each = enumerate(map("*".join, product(*several)), 1)
+            sum_ = " + ".join(f"c{k}*{text}" for k, text in each)
             text = "*".join([*single, f"({sum_})" if single else sum_])
         else:
             text = "*".join(["c", *single])
@@ -123,7 +127,7 @@ def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float,
     -------
     Lower and upper bound.
     """
-    if name != "k":
+    if name not in _FREQUENCIES:
         return given
     return round(max(value - _REACH, _LOWEST), 2), round(value + _REACH, 2)
 
@@ -163,17 +167,40 @@ def extended(seeds: Sequence[LibraryTerm], factors: Sequence[Factor]) -> tuple[L
     seeds : some terms; those of two factors are extended.
     factors : by which they are multiplied, where no factor is of the same sort of the same joint.
     """
-    found: dict[frozenset[Factor], LibraryTerm] = {}
+    found = []
     for seed, factor in product(seeds, factors):
         places = {(one.sort, one.joint) for one in seed.factors}
-        new = (*seed.factors, factor)
-        shapes = [one.shape[0] for one in new if one.shape]
-        several = sum(len(one.texts) > 1 for one in new)
         if len(seed.factors) != 2 or (factor.sort, factor.joint) in places:
             continue
-        if several <= 1 and len(set(shapes)) == len(shapes) and factor.sort != "session":
-            found.setdefault(frozenset(new), LibraryTerm(new))
-    return tuple(found.values())
+        if factor.sort != "session":
+            found += _term((*seed.factors, factor))
+    return tuple(dict.fromkeys(found))
+
+
+def pairs_within(terms: Sequence[LibraryTerm]) -> tuple[LibraryTerm, ...]:
+    """Return products of all but one factor of some terms, each once.
+
+    Parameters
+    ----------
+    terms : of three factors.
+    """
+    pairs = (pair for one in terms for pair in combinations(one.factors, 2))
+    return tuple(dict.fromkeys(chain.from_iterable(map(_term, pairs))))
+
+
+def _term(factors: tuple[Factor, ...]) -> list[LibraryTerm]:
+    """The product of some factors, in one order, with names of their own for their shapes.
+
+    None of more than two waves, or of more than one factor that fades.
+    """
+    names, found = list(_FREQUENCIES), []
+    for one in sorted(factors, key=lambda one: (one.joint or "", _ORDER.index(one.sort))):
+        shape = one.shape
+        if shape is not None and shape[0] in _FREQUENCIES:
+            shape = (names.pop(0) if names else shape[0], *shape[1:])
+        found.append(replace(one, shape=shape))
+    shapes = [one.shape[0] for one in found if one.shape]
+    return [LibraryTerm(tuple(found))] if len(set(shapes)) == len(shapes) else []
 
 
 def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[LibraryTerm]:

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -112,8 +113,10 @@ class _Products:
                 if one not in self.factors:
                     self.factors[one] = free
                     free += len(one.texts)
-            for k in range(term.size):
-                at = [self.factors[one] + (k if len(one.texts) > 1 else 0) for one in term.factors]
+            columns = (
+                range(self.factors[one], self.factors[one] + len(one.texts)) for one in term.factors
+            )
+            for at in product(*columns):
                 places.append((*at, *(0,) * (_MOST_FACTORS - len(at))))
         self.sizes = np.array(sizes, dtype=int)
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)])
