@@ -160,7 +160,6 @@ def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
     ],
 )
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
     base = Model(ROBOT) + "coulomb_friction"
     (first,), (second,) = (effects_of(label, ROBOT) for label in pair)

@@ -321,6 +321,9 @@ class GlobalSearchCriteria(CriteriaGroup):
     finalists: int = criterion(
         24, "shapes", "shapes about which the other recordings are asked", least=1
     )
+    refined: int = criterion(
+        3, "shapes", "shapes from which the gradient begins, of an effect that is given", least=1
+    )
     recordings: int = criterion(
         4, "recordings", "recordings on which what fits one alone is sought again", least=1
     )

@@ -101,18 +101,25 @@ def global_search(
     return None
 
 
-def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect:
-    """Return an effect at the best of all its shapes and values; as it is where none explains much.
+def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> tuple[Effect, ...]:
+    """Return an effect at the best of all its shapes and values, and at others nearly as good.
 
     Parameters
     ----------
     evidence : the training recordings.
     fitted : the model without the effect.
     effect : of many shapes, see `Effect.sought_in`.
+
+    Returns
+    -------
+    The best first, each refined; none where none explains much.
     """
     base = FittedModel(evidence=evidence, fitted=fitted)
-    _, found = _searched((base,), base, (effect,), (), lambda _: None)
-    return refined(evidence, fitted, found[0][1]).effect if found else effect
+    searches, _ = _searched((base,), base, (effect,), (), lambda _: None)
+    # What gives way by bursts has many optima near each other: several are begun from.
+    begins = _finalists(evidence, fitted, searches)[: evidence.criteria.global_search.refined]
+    found = [refined(evidence, fitted, one) for one in begins]
+    return tuple(one.effect for one in sorted(found, key=lambda one: -one.fall))
 
 
 def _searched(
@@ -214,22 +221,18 @@ def _finals(
     bases: Sequence[AnyModel], searches: Sequence[ShapeSolution[ScoreTrial]]
 ) -> list[tuple[float, Score, AnyModel]]:
     """The best of what was found for each model, and its share of what that model leaves."""
-    every = [
-        (one, _final(one.evidence, one.fitted, searches))
-        for one in bases
-        if one.fitted.error_signal > 0
-    ]
-    return [
-        (best.fall / base.fitted.error_signal, best, base)
-        for base, best in every
-        if best is not None
-    ]
+    found = []
+    for base in bases:
+        if base.fitted.error_signal > 0:
+            best = _finalists(base.evidence, base.fitted, searches)[:1]
+            found += [(one.fall / base.fitted.error_signal, one, base) for one in best]
+    return found
 
 
-def _final(
+def _finalists(
     evidence: Evidence, fitted: EvidenceFit, searches: Sequence[ShapeSolution[ScoreTrial]]
-) -> Score | None:
-    """The best of what was found on one recording, by all of them; None if it explains little."""
+) -> list[Score]:
+    """What was found on one recording, by all of them, the best first; not what explains little."""
     scores = [
         one
         for found in searches
@@ -238,7 +241,7 @@ def _final(
         if admissible(one, evidence, fitted)
         and one.drop_at_point > evidence.criteria.global_search.least * fitted.error_signal
     ]
-    return max(scores, key=lambda one: one.fall, default=None)
+    return sorted(scores, key=lambda one: -one.fall)
 
 
 def _headed(ranking: Ranking, best: Score, tests: int, alike: float) -> Ranking:

@@ -34,10 +34,11 @@ def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
         if not may_be_elsewhere(evidence, fitted, effect):
             continue
         others = fit_evidence(evidence, fitted.model - effect, fitted)
-        better = best_anywhere(evidence, others, effect)
-        if better is not effect:
+        for better in best_anywhere(evidence, others, effect):
             trial = refitted(evidence, fitted.model.with_shapes((better,)), fitted)
             fitted = min((fitted, trial), key=lambda one: one.misfit(others))
+            if not may_be_elsewhere(evidence, fitted, effect):
+                break
     return fitted
 
 
