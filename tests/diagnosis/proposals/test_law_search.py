@@ -59,6 +59,28 @@ def test_a_product_of_three_is_found_by_way_of_products_of_two() -> None:
 
 
 @pytest.mark.slow
+def test_a_product_of_three_is_found_from_a_wrong_one_by_exchanging_its_factors() -> None:
+    """Of the one best product of two, v[shoulder]^3 and a wave, no third factor makes it."""
+    search, fitted = searched(recordings({"c*abs(v)*q*v[shoulder]": 0.4}))
+    for exchanged, is_found in ((0, False), (6, True)):
+        numbers = replace(search.evidence.criteria.proposals, seeds=1, exchanged=exchanged)
+        criteria = replace(search.evidence.criteria, proposals=numbers)
+        one = replace(search, evidence=replace(search.evidence, criteria=criteria))
+        found = next(one.found(fitted)).proposal
+        assert (found.torque == "c*abs(v)*q*v[shoulder]") == is_found
+
+
+@pytest.mark.slow
+def test_waves_over_two_joints_are_found_whatever_their_phases() -> None:
+    (found,) = proposals({"c*v*sin(2.4*q + 0.3)*sin(4.7*q[shoulder] - 0.4)": 0.6})
+    assert found.torque.startswith("v*(c1*sin(k*q)*sin(m*q[shoulder]) + c2*sin(k*q)*cos(m*q")
+    assert found.is_explanation
+    for value, sigma, true in zip(found.effect.shape, found.shape_sigma, (2.4, 4.7), strict=True):
+        assert value == pytest.approx(true, abs=4 * sigma)
+        assert sigma < 0.2
+
+
+@pytest.mark.slow
 def test_shapes_of_a_law_of_another_joint_have_a_sigma() -> None:
     found = proposals({"c*v*sin(2.4*q[shoulder])": 0.4})[0]
     assert found.torque == "v*(c1*sin(k*q[shoulder]) + c2*cos(k*q[shoulder]))"

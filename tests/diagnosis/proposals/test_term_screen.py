@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm, library
+from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm, extended, library
 from dynident.diagnosis.proposals.term_screen import screen
 from dynident.model import Model
 from dynident.robot import Robot
@@ -16,7 +18,11 @@ ELBOW = 1
 V, Q = Factor("motion", ("{v}",)), Factor("position", ("{q}",))
 WAVE = Factor("position", ("sin({shape}*{q})", "cos({shape}*{q})"), None, ("k", 2.0, 1.0, 3.0))
 FAR = Factor("motion", ("{v}^2",), "shoulder")
-TERMS = tuple(LibraryTerm(one) for one in ((V, Q), (V, WAVE), (Q, FAR), (FAR,)))
+FAR_WAVE = replace(WAVE, joint="shoulder", shape=("k", 3.0, 2.0, 4.0))
+TERMS = (
+    *(LibraryTerm(one) for one in ((V, Q), (V, WAVE), (Q, FAR), (FAR,))),
+    *extended([LibraryTerm((V, WAVE))], [FAR_WAVE]),
+)
 LAW = {"c*v*q": 0.5}
 
 
@@ -40,6 +46,11 @@ def test_the_drop_is_that_of_least_squares_with_the_columns(made) -> None:
         TERMS[1]: lambda q, v: [v[:, 1] * np.sin(2 * q[:, 1]), v[:, 1] * np.cos(2 * q[:, 1])],
         TERMS[2]: lambda q, v: [q[:, 1] * v[:, 0] ** 2],
         TERMS[3]: lambda q, v: [v[:, 0] ** 2],
+        TERMS[4]: lambda q, v: [
+            v[:, 1] * one(2 * q[:, 1]) * other(3 * q[:, 0])
+            for one in (np.sin, np.cos)
+            for other in (np.sin, np.cos)
+        ],
     }
     for term, drop in found.items():
         x, y, c = [], [], []
