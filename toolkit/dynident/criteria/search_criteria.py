@@ -322,7 +322,7 @@ class GlobalSearchCriteria(CriteriaGroup):
         24, "shapes", "shapes about which the other recordings are asked", least=1
     )
     refined: int = criterion(
-        3, "shapes", "shapes from which the gradient begins, of an effect that is given", least=1
+        3, "shapes", "shapes from which an effect that is given is fitted again", least=1
     )
     recordings: int = criterion(
         4, "recordings", "recordings on which what fits one alone is sought again", least=1
@@ -330,7 +330,8 @@ class GlobalSearchCriteria(CriteriaGroup):
     holds: float = criterion(
         0.9,
         "1",
-        "share explained of all recordings over that of one, below which it fits that one alone",
+        "share explained of all recordings over that of one, below which it fits that one alone; "
+        "and of another shape's over the best one's, below which it is not fitted again",
         least=0,
         most=1,
     )
@@ -418,6 +419,9 @@ class ProposalCriteria(CriteriaGroup):
         most=1,
     )
     contenders: int = criterion(12, "laws", "laws of each screening that are looked at", least=1)
+    double_waves: int = criterion(
+        4, "laws", "laws with waves over two positions that are looked at beside these", least=0
+    )
     seeds: int = criterion(
         12, "laws", "products of two factors of each screening that a third is tried with", least=0
     )

@@ -103,6 +103,8 @@ class LawSearch:
         best: _BestLaws | None = None
         for _ in range(criteria.rounds):
             looked_at, tried = self._looked_at(metric, terms)
+            if best is not None:  # in this metric, too, with the shapes that it has by now
+                looked_at = [best.term, *looked_at]
             tried *= searches
             passing = tuple(self._confirmed(metric, looked_at, tried, name))
             if not passing:
@@ -112,7 +114,7 @@ class LawSearch:
             if best is not None and _alike(first, best.effect):
                 return replace(best, scores=passing, tried=tried)
             wider = self._with(first, fitted)
-            best = _BestLaws(scores=passing, tried=tried, wider=wider)
+            best = _BestLaws(scores=passing, tried=tried, wider=wider, term=_of(first, looked_at))
             metric = in_metric_of(self.evidence, fitted, wider)
         return best
 
@@ -155,7 +157,7 @@ class LawSearch:
         self, metric: EvidenceFit, terms: dict[int, tuple[LibraryTerm, ...]]
     ) -> tuple[list[tuple[int, LibraryTerm]], int]:
         """The terms that are evaluated as effects are, the best of the screening; of how many."""
-        found: list[tuple[float, int, LibraryTerm]] = []
+        found: list[tuple[int, Screened]] = []
         criteria, tried = self.evidence.criteria.proposals, 0
         for joint, some in terms.items():
             self.progress(f"laws at {metric.model.robot.names[joint]}")
@@ -163,32 +165,37 @@ class LawSearch:
             kept = screen(self.evidence, metric, joint, repeating)
             wider, more = self._of_three(metric, joint, some, kept)
             tried += len(some) + more
-            found += [(one.penalised, joint, one.term) for one in (*kept, *wider)]
-        found = _best_start(found)
+            found += [(joint, one) for one in (*kept, *wider)]
+        found.sort(key=lambda one: -one[1].penalised)
+        every = [(joint, one.term) for joint, one in _best_start(found)]
         session = [(j, one) for j, some in terms.items() for one in some if one.of_session]
-        best = [(joint, term) for _, joint, term in found[: criteria.contenders]]
+        # Two waves are like much else, and would leave no place for what is simpler.
+        double = [one for one in every if one[1].waves > 1]
+        others = [one for one in every if one[1].waves <= 1]
+        best = [*others[: criteria.contenders], *double[: criteria.double_waves]]
         return best + session, tried
 
     def _of_three(
         self,
         metric: EvidenceFit,
         joint: int,
-        library: Sequence[LibraryTerm],
+        some: Sequence[LibraryTerm],
         kept: Sequence[Screened],
     ) -> tuple[list[Screened], int]:
-        """Products of three factors, best first: of the best of two, then by exchanging factors.
+        """Products of three factors, the best first, and how many were tried.
 
         Whatever a product of three is, some product of two of them is like it; but not always one
-        of the right two. So the best products of three give the next seeds, each less one factor.
+        of the right two. So the best are exchanged a factor at a time, until none does better. What
+        is counted are the terms that were tried, of all that might have been.
         """
         criteria = self.evidence.criteria.proposals
-        factors = [one.factors[0] for one in library if len(one.factors) == 1]
+        factors = [one.factors[0] for one in some if len(one.factors) == 1]
         seeds = [one.term for one in kept[: criteria.seeds]]
         found: list[Screened] = []
         tried: set[LibraryTerm] = set()
         while new := [one for one in extended(seeds, factors) if one not in tried]:
             before = found[0].penalised if found else 0.0
-            beside = len(library) + len(tried)
+            beside = len(some) + len(tried)
             found += screen(self.evidence, metric, joint, new, beside=beside)
             found.sort(key=lambda one: -one.penalised)
             tried.update(new)
@@ -285,11 +292,13 @@ class _BestLaws:
     scores : of them.
     tried : terms behind them.
     wider : fit of the model with the best of them.
+    term : of the best of them, with the joint's column, beginning at the shapes that it has.
     """
 
     scores: tuple[Score, ...]
     tried: int
     wider: EvidenceFit
+    term: tuple[int, LibraryTerm]
 
     @property
     def effect(self) -> LawEffect:
@@ -303,6 +312,14 @@ class _BestLaws:
         best, *others = self.scores
         found = [one.effect for one in others if _as_good(one, best, criteria)]
         return tuple(one for one in found if isinstance(one, LawEffect))
+
+
+def _of(effect: Effect, looked_at: Sequence[tuple[int, LibraryTerm]]) -> tuple[int, LibraryTerm]:
+    """The term of a law, beginning at the law's shapes."""
+    assert isinstance(effect, LawEffect)
+    law = effect.made_of
+    joint, term = next(one for one in looked_at if one[1].torque == law.torque)
+    return joint, term.beginning_at(effect.shape)
 
 
 def _recentred(effect: LawEffect) -> LawEffect:
@@ -334,11 +351,11 @@ def _other_widths(fitted: EvidenceFit, wider: EvidenceFit) -> str:
     return f"With it dry friction reverses over {', '.join(changed)}." if changed else ""
 
 
-def _best_start(found: Sequence[tuple[float, int, LibraryTerm]]) -> list:
-    """Of each law at each joint that with the best start of its shapes, the best first."""
-    best: dict[tuple[int, str], tuple[float, int, LibraryTerm]] = {}
-    for one in sorted(found, key=lambda one: -one[0]):
-        best.setdefault((one[1], one[2].law("x").torque), one)
+def _best_start(found: Sequence[tuple[int, Screened]]) -> list[tuple[int, Screened]]:
+    """Of each law at each joint that with the first start of its shapes, in their order."""
+    best: dict[tuple[int, str], tuple[int, Screened]] = {}
+    for joint, one in found:
+        best.setdefault((joint, one.term.torque), (joint, one))
     return list(best.values())
 
 

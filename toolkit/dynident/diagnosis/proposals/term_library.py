@@ -19,6 +19,8 @@ from dynident.formulas import quoted_joint
 from dynident.robot import Robot
 
 Sort = Literal["position", "motion", "load", "session"]
+Shape = tuple[str, float, float, float]
+"""Name, start, lower and upper bound of a parameter inside a factor."""
 _ORDER: tuple[Sort, ...] = ("motion", "position", "load", "session")  # of factors in a term
 HARMONICS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 """Frequencies of sines of the position, rad per rad or m; between them they are sought."""
@@ -39,13 +41,13 @@ class Factor:
     texts : formulas of its columns, with "{q}", "{v}" ... for the signals of its joint and the
         names of its shapes for their values.
     joint : None for the joint of the law.
-    shape : (name, start, lower, upper) of its one shape parameter; or none.
+    shape : its one shape parameter; or none.
     """
 
     sort: Sort
     texts: tuple[str, ...]
     joint: str | None = None
-    shape: tuple[str, float, float, float] | None = None
+    shape: Shape | None = None
 
     def columns(self) -> tuple[str, ...]:
         """Formulas of its columns, its shape at the start."""
@@ -86,6 +88,11 @@ class LibraryTerm:
         return len(self.factors) + sum(one.joint is not None for one in self.factors)
 
     @property
+    def waves(self) -> int:
+        """How many of its factors are waves over a position."""
+        return sum(len(one.texts) > 1 for one in self.factors)
+
+    @property
     def of_load(self) -> bool:
         """Whether the predicted torque is in it."""
         return any(one.sort == "load" for one in self.factors)
@@ -95,23 +102,41 @@ class LibraryTerm:
         """Whether the time is in it: it does not repeat with the motion."""
         return any(one.sort == "session" for one in self.factors)
 
-    def law(self, name: str) -> Law:
-        """Return the law with a coefficient for each column, its frequencies and decays free."""
+    @property
+    def torque(self) -> str:
+        """Its formula, with a coefficient for each column."""
         single = [one.formulas()[0] for one in self.factors if len(one.texts) == 1]
         several = [one.formulas() for one in self.factors if len(one.texts) > 1]
         if several:
             each = enumerate(map("*".join, product(*several)), 1)
             sum_ = " + ".join(f"c{k}*{text}" for k, text in each)
-            text = "*".join([*single, f"({sum_})" if single else sum_])
-        else:
-            text = "*".join(["c", *single])
+            return "*".join([*single, f"({sum_})" if single else sum_])
+        return "*".join(["c", *single])
+
+    def law(self, name: str) -> Law:
+        """Return the law of that formula, its frequencies and decays free."""
         shapes = [one.shape for one in self.factors if one.shape]
-        return Law(name=name, torque=text, shape=tuple((n, low, up) for n, _, low, up in shapes))
+        ranges = tuple((name, lower, upper) for name, _, lower, upper in shapes)
+        return Law(name=name, torque=self.torque, shape=ranges)
 
     @property
     def start(self) -> tuple[float, ...]:
         """Shapes at which it was screened, in the order of the law's."""
         return tuple(one.shape[1] for one in self.factors if one.shape)
+
+    def beginning_at(self, shape: Sequence[float]) -> LibraryTerm:
+        """Return the term with other shapes to begin with, in the order of `start`."""
+        values = iter(shape)
+        factors = (
+            one if one.shape is None else replace(one, shape=_begun(one.shape, next(values)))
+            for one in self.factors
+        )
+        return LibraryTerm(tuple(factors))
+
+
+def _begun(shape: Shape, value: float) -> Shape:
+    name, _, *given = shape
+    return (name, value, *centred(name, value, (given[0], given[1])))
 
 
 def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float, float]:
@@ -153,6 +178,7 @@ def library(robot: Robot, joint: str, slowest: float = _SLOWEST) -> tuple[Librar
         terms += [
             LibraryTerm((one, other)) for one, other in product(own, far) if _coupled(one, other)
         ]
+        terms += chain.from_iterable(map(_term, product(_waves(own), _waves(far))))
         terms += _products(far, far)
         terms += [LibraryTerm((one, other)) for one, other in product(far, load) if _plain(one)]
     terms += [LibraryTerm(pair) for pair in combinations(map(_speed, others), 2)]
@@ -197,7 +223,9 @@ def _term(factors: tuple[Factor, ...]) -> list[LibraryTerm]:
     for one in sorted(factors, key=lambda one: (one.joint or "", _ORDER.index(one.sort))):
         shape = one.shape
         if shape is not None and shape[0] in _FREQUENCIES:
-            shape = (names.pop(0) if names else shape[0], *shape[1:])
+            if not names:
+                return []
+            shape = (names.pop(0), *shape[1:])
         found.append(replace(one, shape=shape))
     shapes = [one.shape[0] for one in found if one.shape]
     return [LibraryTerm(tuple(found))] if len(set(shapes)) == len(shapes) else []
@@ -207,6 +235,10 @@ def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[Libr
     """Position times motion, of one joint."""
     pairs = product(some, others)
     return [LibraryTerm((b, a)) for a, b in pairs if (a.sort, b.sort) == ("position", "motion")]
+
+
+def _waves(some: tuple[Factor, ...]) -> list[Factor]:
+    return [one for one in some if len(one.texts) > 1]
 
 
 def _coupled(own: Factor, far: Factor) -> bool:

@@ -117,9 +117,11 @@ def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> tu
     base = FittedModel(evidence=evidence, fitted=fitted)
     searches, _ = _searched((base,), base, (effect,), (), lambda _: None)
     # What gives way by bursts has many optima near each other: several are begun from.
-    begins = _finalists(evidence, fitted, searches)[: evidence.criteria.global_search.refined]
+    own = evidence.criteria.global_search
+    begins = _finalists(evidence, fitted, searches)[: own.refined]
     found = [refined(evidence, fitted, one) for one in begins]
-    return tuple(one.effect for one in sorted(found, key=lambda one: -one.fall))
+    found.sort(key=lambda one: -one.fall)
+    return tuple(one.effect for one in found if one.fall >= own.holds * found[0].fall)
 
 
 def _searched(
@@ -221,18 +223,18 @@ def _finals(
     bases: Sequence[AnyModel], searches: Sequence[ShapeSolution[ScoreTrial]]
 ) -> list[tuple[float, Score, AnyModel]]:
     """The best of what was found for each model, and its share of what that model leaves."""
-    found = []
-    for base in bases:
-        if base.fitted.error_signal > 0:
-            best = _finalists(base.evidence, base.fitted, searches)[:1]
-            found += [(one.fall / base.fitted.error_signal, one, base) for one in best]
-    return found
+    every = ((one, _finalists(one.evidence, one.fitted, searches)[:1]) for one in bases)
+    return [
+        (best.fall / base.fitted.error_signal, best, base) for base, some in every for best in some
+    ]
 
 
 def _finalists(
     evidence: Evidence, fitted: EvidenceFit, searches: Sequence[ShapeSolution[ScoreTrial]]
 ) -> list[Score]:
-    """What was found on one recording, by all of them, the best first; not what explains little."""
+    """What was found on one recording, by all of them, the best first, if it explains enough."""
+    if not fitted.error_signal > 0:
+        return []
     scores = [
         one
         for found in searches
