@@ -94,6 +94,24 @@ def test_what_is_said_of_a_position_holds_for_speed_and_torque(tmp_path: Path) -
     assert not {"zeros", "coupling", "units and signs"} & set(said)
     given = arm.draft(columns={**STATED, "tau.j2": "m_tau[2]"})
     assert given.columns["tau.j2"].name == "m_tau[2]"
+    (said,) = (one for one in given.decisions if one.subject == "stated")
+    assert "tau.j2 of the joint: a motor's would be multiplied by its gear" in said.reason
+
+
+def test_behind_gears_a_column_without_a_name_is_asked_for_with_its_ratio(tmp_path: Path) -> None:
+    arm = written(tmp_path, chain_text(N, 1), 0.0)
+    with np.load(tmp_path / "run.npz") as file:
+        t, position, torque = file["t"], file["m_pos"], file["m_tau"]
+    for values, asked in (
+        ({"pq": position, "m_tau": torque}, "q.j0 = NAME/50"),
+        ({"m_pos": position, "um": torque}, "tau.j0 = 50*NAME"),
+    ):
+        np.savez(tmp_path / "run.npz", t=t, **values)
+        with pytest.raises(RecordingError, match=re.escape(asked)):
+            arm.draft()
+    told = {f"tau.j{k}": f"{ratio:g}*um[{k}]" for k, ratio in enumerate(RATIOS)}
+    read = arm.study(arm.draft(columns=told)).train.recordings[0]
+    np.testing.assert_allclose(read.tau, arm.recording.tau, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,8 @@ def _file(path: Path) -> Check:
         raise RobotError(
             "is empty" if not start else "is neither a robot description nor a saved estimate",
             str(path),
-            "give a URDF, SDF or MJCF file, or a JSON file that Estimate.save wrote",
+            "give a URDF, SDF or MJCF file, or an estimate that `dynident fit --out` wrote; "
+            "a study is shown by `dynident show` and fitted by `dynident fit`",
         )
     try:
         robot = Robot.from_text(text, str(path))

@@ -48,4 +48,7 @@ def decided(decision: Decision, ask: Ask | None) -> Decision:
     """
     if ask is None or not decision.is_open:
         return decision
-    return replace(decision, chosen=ask(decision))
+    chosen = ask(decision)
+    # What speaks for the likeliest choice is no reason for another.
+    reason = "so it was said" if chosen else decision.reason
+    return replace(decision, chosen=chosen, reason=reason)

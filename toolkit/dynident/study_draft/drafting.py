@@ -100,7 +100,7 @@ def draft_study(
     logs = _named(data, described, facts, notes)
     sensors = wrench_groups(list(logs[0].columns), described)
     needed = ("q",) if sensors else ("q", "tau")
-    matched = match(logs[0], described, needed, facts.columns)
+    matched = match(logs[0], described, needed, facts.columns, facts.gears)
     chosen = _chosen(matched, notes)
     wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
@@ -320,6 +320,8 @@ def _of_joints(
             joints = ", ".join(f"tau.{joint}" for joint in found.followed)
             follow = "follow" if found.followed[1:] else "follows"
             reason += f"; {joints} {follow}, for power is the same on either side of gears"
+        if facts.gears is not None and (bare := _named_torques(facts, logs[0])):
+            reason += f"; {bare} of the joint: a motor's would be multiplied by its gear"
         if motors is not None and len(couplings := couplings_of(motors, robot)) == 1:
             reason += f"; {couplings[0].words}"
         notes.take("stated", [", ".join(facts.columns)], reason)
@@ -330,6 +332,12 @@ def _of_joints(
         stated=facts.states_positions,
         motors=motors,
     )
+
+
+def _named_torques(facts: LogFacts, log: Log) -> str:
+    """Torques that were stated by the name of a column alone, which no gear multiplies."""
+    found = [ours for ours, text in facts.columns.items() if text in log.columns]
+    return ", ".join(ours for ours in found if ours.startswith("tau."))
 
 
 def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:

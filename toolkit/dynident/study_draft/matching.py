@@ -89,6 +89,7 @@ def match(
     robot: Robot,
     needed: Sequence[str] = ("q", "tau"),
     told: Mapping[str, str] = MappingProxyType({}),
+    gears: Sequence[float] | None = None,
 ) -> Matched:
     """Return the columns of a log by time, signals and joints.
 
@@ -98,6 +99,7 @@ def match(
     robot : whose joints they are of.
     needed : signals without which there is no study.
     told : ours -> a column of the file, or an expression of one, for signals that no name tells.
+    gears : ratios, where the file is of the motors' side.
 
     Raises
     ------
@@ -142,7 +144,7 @@ def match(
                 shown += ", ..." if len(log.skipped) > 10 else ""
             remedy = (
                 f"it holds {shown}; joints: {', '.join(robot.names)}. Say which they are, "
-                f'--column "{signal}.{robot.names[0]} = NAME" for each joint'
+                f'--column "{signal}.{robot.names[0]} = {_name(signal, gears)}" for each joint'
             )
             held = {role.joint for role in roles if role.signal in _ALIKE[signal]}
             lacking = [name for k, name in enumerate(robot.names) if k not in held]
@@ -152,6 +154,13 @@ def match(
     found = {signal: tuple(some) for signal, some in groups.items() if some}
     readable = [role for role in roles if role.column in log.columns]
     return Matched(time=_clock(log, readable), groups=found)
+
+
+def _name(signal: str, gears: Sequence[float] | None) -> str:
+    """What to write of the first joint for a column, which may be of its motor."""
+    if not gears:
+        return "NAME"
+    return f"{gears[0]:g}*NAME" if signal == "tau" else f"NAME/{gears[0]:g}"
 
 
 def _unread(roles: Sequence[ColumnRole], log: Log) -> list[str]:
