@@ -114,7 +114,8 @@ class LawSearch:
             if best is not None and _alike(first, best.effect):
                 return replace(best, scores=passing, tried=tried)
             wider = self._with(first, fitted)
-            best = _BestLaws(scores=passing, tried=tried, wider=wider, term=_of(first, looked_at))
+            term = _of(first, looked_at, fitted.model.robot.names)
+            best = _BestLaws(scores=passing, tried=tried, wider=wider, term=term)
             metric = in_metric_of(self.evidence, fitted, wider)
         return best
 
@@ -314,11 +315,13 @@ class _BestLaws:
         return tuple(one for one in found if isinstance(one, LawEffect))
 
 
-def _of(effect: Effect, looked_at: Sequence[tuple[int, LibraryTerm]]) -> tuple[int, LibraryTerm]:
-    """The term of a law, beginning at the law's shapes."""
+def _of(
+    effect: Effect, looked_at: Sequence[tuple[int, LibraryTerm]], names: Sequence[str]
+) -> tuple[int, LibraryTerm]:
+    """The term of a law and the joint's column, beginning at the law's shapes."""
     assert isinstance(effect, LawEffect)
-    law = effect.made_of
-    joint, term = next(one for one in looked_at if one[1].torque == law.torque)
+    asked = effect.joint, effect.made_of.torque
+    joint, term = next((j, one) for j, one in looked_at if (names[j], one.torque) == asked)
     return joint, term.beginning_at(effect.shape)
 
 
