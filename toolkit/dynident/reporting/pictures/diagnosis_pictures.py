@@ -29,7 +29,14 @@ from dynident.reporting.content import (
     x_title,
     y_title,
 )
-from dynident.reporting.pictures.look import FAINT, dressed, mark, plain, single_precision
+from dynident.reporting.pictures.look import (
+    FAINT,
+    dressed,
+    mark,
+    named_rows,
+    plain,
+    single_precision,
+)
 
 _LONG = 0.58
 """Share of the width from which on a bar has its number inside."""
@@ -87,16 +94,7 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
     figure.add_annotation(text=head, y=1, yref="paper", yanchor="bottom", showarrow=False, **place)
     ticks = ["<br>".join(plain(line) for line in row.lines) for row in rows]
     figure.update_xaxes(title="held-out torque error (%)", range=[0, width], fixedrange=True)
-    figure.update_yaxes(
-        tickvals=list(range(len(rows))),
-        ticktext=ticks,
-        range=[len(rows) - 0.4, -0.6],
-        automargin=True,
-        fixedrange=True,
-        showgrid=False,
-        zeroline=False,
-        ticklabelstandoff=6,
-    )
+    figure.update_yaxes(named_rows(ticks))
     height = 86 + sum(18 + 15 * len(row.lines) for row in rows)
     return dressed(figure, height, top=28)
 

@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GIVEN, GREY, after_name
-from dynident.reporting.pictures.look import dressed, mark, plain
+from dynident.reporting.pictures.look import dressed, mark, named_rows, plain
 
 
 def joint_errors(diagnosis: Diagnosis) -> go.Figure:
@@ -48,15 +48,6 @@ def joint_errors(diagnosis: Diagnosis) -> go.Figure:
             )
         )
     figure.update_xaxes(title="held-out torque error (%)", rangemode="tozero", fixedrange=True)
-    figure.update_yaxes(
-        tickvals=rows,
-        ticktext=[plain(joint.name) for joint in joints],
-        range=[len(rows) - 0.4, -0.6],
-        automargin=True,
-        fixedrange=True,
-        showgrid=False,
-        zeroline=False,
-        ticklabelstandoff=6,
-    )
+    figure.update_yaxes(named_rows([plain(joint.name) for joint in joints]))
     # The page has one legend for this picture and for the maps.
     return dressed(figure, 76 + 34 * len(rows)).update_layout(showlegend=False)

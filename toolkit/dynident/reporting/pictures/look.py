@@ -53,6 +53,20 @@ def look(height: int, top: int = 10, right: int = 16) -> dict:
     return {"template": _LOOK, "height": height, "margin": margin}
 
 
+def named_rows(names: list[str]) -> dict:
+    """Settings of a vertical axis with a name for each row, the first one on top."""
+    return {
+        "tickvals": list(range(len(names))),
+        "ticktext": names,
+        "range": [len(names) - 0.4, -0.6],
+        "automargin": True,
+        "fixedrange": True,
+        "showgrid": False,
+        "zeroline": False,
+        "ticklabelstandoff": 6,
+    }
+
+
 def dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
     """Give a figure the package's `look`, and return it.
 
