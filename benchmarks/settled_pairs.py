@@ -54,8 +54,6 @@ class OpenPair:
 PAIRS = (
     OpenPair("quadratic_drag@elbow", (0.3,), "stribeck_friction@elbow"),
     OpenPair("quadratic_drag@shoulder", (0.3,), "stribeck_friction@shoulder"),
-    OpenPair("coulomb_friction@elbow", (0.7,), "stribeck_friction@elbow"),
-    OpenPair("coulomb_friction@shoulder", (1.6,), "stribeck_friction@shoulder"),
     OpenPair("joint_spring@elbow", (0.1, 0.0), "torque_ripple@elbow"),
     OpenPair("joint_spring@shoulder", (5.0, 0.0), "torque_ripple@shoulder"),
     OpenPair("torque_offset@elbow", (0.3,), "torque_ripple@elbow", reach=0.2),

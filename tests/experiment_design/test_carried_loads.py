@@ -141,6 +141,7 @@ def test_rivals_imitate_with_the_load_on_board() -> None:
             effect_values=np.array([0.5]),
             std=np.ones(2),
             rivals=(friction,),
+            shapes=0,
             carries_payload=carries,
         )
         block = model.block(t, q, v, a, carries_payload=carries)

@@ -31,6 +31,7 @@ def imitations(first, *rivals) -> Imitations:
         effect_values=np.array(SIZES[first.label]),
         std=STD,
         rivals=shapes_of(rivals, ROBOT),
+        shapes=len(first.shape),
     )
 
 
@@ -67,6 +68,22 @@ def test_it_is_what_the_nearest_rival_leaves_of_the_torque(first, rivals) -> Non
         assert min(near) > 0.85 * min(every)
 
 
+def test_a_rival_with_more_parameters_is_told_by_chance_alone() -> None:
+    """A diagnosis names none that explains less with more, however little less that is."""
+    t, moved = motion()
+    told = {
+        name: found.told(found.moments(t, moved))
+        for name, found in {
+            "ripple": imitations(SPRING, RIPPLE),
+            "drag": imitations(SPRING, DRAG),
+            "both": imitations(SPRING, RIPPLE, DRAG),
+        }.items()
+    }
+    assert told["ripple"].share < 1.0 and told["ripple"].share_alike == 1.0
+    assert told["drag"].share_alike == told["drag"].share == told["both"].share_alike
+    assert told["both"].share == told["ripple"].share < told["drag"].share
+
+
 def test_moments_add_up_and_grow_with_rows() -> None:
     found, (t, moved) = imitations(DRAG, STRIBECK), motion()
     whole = found.moments(t, moved)
@@ -89,9 +106,10 @@ def test_what_the_model_explains_is_told_from_nothing() -> None:
         effect_values=np.array([1.0]),
         std=STD,
         rivals=shapes_of((SPRING,), ROBOT),
+        shapes=0,
     )
     t, moved = motion()
-    assert found.told(found.moments(t, moved)) == Told(sigma=0.0, share=0.0)
+    assert found.told(found.moments(t, moved)) == Told(sigma=0.0, share=0.0, share_alike=0.0)
 
 
 def test_the_least_that_decides_is_what_a_comparison_of_squares_can_tell() -> None:
@@ -112,6 +130,7 @@ def separation(designed: float, share: float, enough: float) -> Separation:
         designed=designed,
         usual=2.0,
         share=share,
+        share_alike=share,
         worth=3.0,
         enough=enough,
     )

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynident.diagnosis.search.alternatives import as_likely
 from dynident.diagnosis.search.ranking import Ranking, rank
+from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.search.selection import AddedEffect, choose
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence
@@ -67,3 +69,32 @@ def test_what_is_enough_instead_is_named() -> None:
     found = chosen(evidence_of((TILT, 0.1)), TILT, ZERO)
     named = {found.score.effect.label, *(one.label for one in found.indistinguishable)}
     assert named == {TILT, ZERO}
+
+
+def scored(label: str, drop: float, loss: float) -> Score:
+    """An effect that every one of thirty blocks finds worse, by a little, the larger the loss."""
+    (effect,) = effects_of(label, PLAIN.robot)
+    return Score(
+        effect=effect,
+        payload_recordings=None,
+        not_identifiable=False,
+        drop=drop,
+        values=(1.0,) * len(effect.parameters(PLAIN.robot)),
+        losses=loss + 0.01 * np.random.default_rng(0).random(30),
+    )
+
+
+@pytest.mark.parametrize(
+    ("rival", "drop", "named"),
+    [
+        ("torque_ripple@shoulder", 995.0, False),  # less, with a shape besides
+        ("torque_ripple@shoulder", 1005.0, True),
+        ("torque_offset@shoulder", 995.0, True),  # less with less: what else is wrong may do that
+        ("joint_zero@shoulder", 995.0, True),  # its column is that of a first guess
+    ],
+)
+def test_what_explains_less_with_more_parameters_is_not_named(rival, drop, named) -> None:
+    evidence = evidence_of((DRAG, 0.1))
+    winner, other = scored("joint_spring@shoulder", 1000.0, 1.0), scored(rival, drop, 2.0)
+    ranking = Ranking((winner, other), 2, ("", ""))
+    assert as_likely(evidence, fit_evidence(evidence, PLAIN), ranking) == [other] * named

@@ -48,7 +48,8 @@ class SearchCriteria(CriteriaGroup):
     alike: float = criterion(
         0.015,
         "1",
-        "relative difference of what two effects explain, up to which they are indistinguishable",
+        "relative difference of what two effects explain, up to which they are indistinguishable, "
+        "unless the one that explains less has more parameters",
         TWO_LINK_CASES,
         least=0,
         most=1,

@@ -92,6 +92,11 @@ class EffectTraits:
         return not (self.depends_on_fit or self.needs_recording)
 
     @property
+    def is_exact(self) -> bool:
+        """Whether the columns follow from the motion alone, at any fit and any values."""
+        return self.is_instantaneous and not self.nonlinear
+
+    @property
     def is_dynamic_response(self) -> bool:
         """Whether the column is a filtered dynamic regressor: a response of the current bodies."""
         return self.needs_bodies and self.needs_recording

@@ -185,6 +185,7 @@ class DesignQuestion:
             effect_values=self.estimate.effect_values(first.label),
             std=self.std,
             rivals=shapes_of(rivals, self.bare.robot),
+            shapes=len(first.shape),
             carries_payload=self.task.load > 0,
         )
 

@@ -248,6 +248,7 @@ def _separation(
         designed=told.sigma,
         usual=rivals.told(known + other).sigma,
         share=told.share,
+        share_alike=told.share_alike,
         worth=times_until(lambda k: rivals.told(known + other * k).sigma - told.sigma),
         enough=times_until(lambda k: rivals.told(known + own * k).beyond),
     )

@@ -120,8 +120,23 @@ def _of_the_confidence_set(
     return tuple(
         other.effect
         for k, other in enumerate(rivals, 1)
-        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
+        if k in kept
+        or (
+            abs(winner.drop - other.drop) <= criteria.alike * winner.drop
+            and not _less_with_more(other, winner)
+        )
     )
+
+
+def _less_with_more(other: Score, winner: Score) -> bool:
+    """Whether a rival explains less than the winner, with more parameters: nothing speaks for it.
+
+    That a little less may be as much allows for what else is wrong with a model. A law that
+    imitates another one by its further freedom, as a long wave does a ramp, has that already.
+    Columns that are taken at a first guess may explain more than they are seen to.
+    """
+    more = other.parameters > winner.parameters
+    return more and other.drop < winner.drop and other.effect.is_exact
 
 
 def _as_much_once_fitted(

@@ -69,6 +69,11 @@ class Score:
     gains: np.ndarray | None = None
 
     @property
+    def parameters(self) -> int:
+        """Number of parameters that the effect brings, its shape among them."""
+        return len(self.values) + len(self.effect.shape)
+
+    @property
     def drop_at_point(self) -> float:
         """The drop if its value is the one at which its column was taken.
 

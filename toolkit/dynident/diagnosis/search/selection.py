@@ -77,7 +77,8 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     # what is left for the others is seen when it is there.
     likely = (best, *as_likely(evidence, fitted, ranking))
     as_good = [s for s in likely if s.drop >= criteria.simpler_share * best.drop]
-    chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
+    # Of what is alike the simplest; of these the first one: they stand in order.
+    chosen = min(as_good, key=lambda one: one.parameters)
     rivals = alternatives(evidence, fitted, chosen, [s for s in likely if s is not chosen])
     return AddedEffect(chosen, ranking.corrected(chosen), tuple(s.effect for s in rivals))
 
@@ -141,11 +142,6 @@ def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> s
         f"fitted with the model it explains {found} of the residual, where its columns alone "
         f"promise {percent(promised, 1)}"
     )
-
-
-def _size(one: Score) -> int:
-    """Number of parameters that an effect brings: of what is alike, the simplest is added."""
-    return len(one.values) + len(one.effect.shape)
 
 
 def alternatives_only(one: AddedEffect, following: Ranking) -> AddedEffect:

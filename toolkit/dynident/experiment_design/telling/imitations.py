@@ -61,6 +61,7 @@ class Imitations:
     effect_values : of the effect, (k,).
     std : (n,) of the noise.
     rivals : each rival in each of its shapes.
+    shapes : number of shape parameters of the effect.
     carries_payload : whether the payload of the model is on board.
     """
 
@@ -70,6 +71,7 @@ class Imitations:
     effect_values: np.ndarray
     std: np.ndarray
     rivals: tuple[Effect, ...]
+    shapes: int
     carries_payload: bool = False
 
     def moments(
@@ -112,6 +114,16 @@ class Imitations:
         return [len(one.parameters(self.model.robot)) for one in self.rivals]
 
     @property
+    def _is_larger(self) -> np.ndarray:
+        """Whether a rival has more parameters, and columns that a diagnosis sees as they are, (r,).
+
+        A diagnosis names no such rival that explains less.
+        """
+        sizes = np.array(self._counts) + [len(one.shape) for one in self.rivals]
+        own = len(self.effect_values) + self.shapes
+        return (sizes > own) & [one.is_exact for one in self.rivals]
+
+    @property
     def _most(self) -> int:
         return max(self._counts)
 
@@ -127,9 +139,9 @@ class Imitations:
         of_torque, of_rivals = taken @ shared[:-1, -1], taken @ cross[:-1]
         alone = float(shared[-1, -1] - of_torque @ of_torque)
         if alone <= _ROUNDING * shared[-1, -1]:
-            return Told(sigma=0.0, share=0.0)
+            return Told(sigma=0.0, share=0.0, share_alike=0.0)
         beside = cross[-1] - of_torque @ of_rivals
-        left, start = alone, 0
+        left, start = [], 0
         for count, whole in zip(self._counts, moments.own, strict=True):
             at = slice(start, start + count)
             start += count
@@ -137,9 +149,13 @@ class Imitations:
             sizes = np.sqrt(np.diag(whole)[:count])
             seen = sizes > _UNSEEN * np.sqrt(np.diag(shared).max())
             own, sizes = own[np.ix_(seen, seen)], sizes[seen]
-            left = min(left, alone - _explained(own, beside[at][seen], sizes))
-        left = left if left > _ROUNDING * shared[-1, -1] else 0.0
-        return Told(sigma=float(np.sqrt(left)), share=left / alone)
+            left.append(alone - _explained(own, beside[at][seen], sizes))
+        rest = np.array(left)
+        rest = np.where(rest > _ROUNDING * shared[-1, -1], rest, 0.0)
+        alike = rest[~self._is_larger].min(initial=alone)
+        return Told(
+            sigma=float(np.sqrt(rest.min())), share=rest.min() / alone, share_alike=alike / alone
+        )
 
 
 def _explained(own: np.ndarray, beside: np.ndarray, size: np.ndarray) -> float:

@@ -18,7 +18,7 @@ leave: x standard deviations apart they differ by x^2, with a standard deviation
 in ten that is beyond 1.96 of these, the conventional level, where x / 2 > 1.96 + 1.28."""
 ALIKE = DEFAULTS.search.alike
 """Share of what an effect explains up to which a diagnosis names what explains the rest with it,
-however many standard deviations that share is."""
+however many standard deviations that share is, unless it has more parameters."""
 NEVER = 0.1
 """Standard deviations below which no length of such a motion does."""
 MOST_TIMES = 1000.0
@@ -32,15 +32,17 @@ class Told:
     ----------
     sigma : standard deviations by which the effect is told from it.
     share : of what the effect explains beside the model, which the rival cannot.
+    share_alike : the same of the nearest rival with no more parameters; 1 where all have more.
     """
 
     sigma: float
     share: float
+    share_alike: float
 
     @property
     def beyond(self) -> float:
         """By how much, of what a decision needs, that is exceeded; below zero it is not reached."""
-        return min(self.sigma / DECIDES, self.share / ALIKE) - 1.0
+        return min(self.sigma / DECIDES, self.share_alike / ALIKE) - 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +55,8 @@ class Separation:
     advice : the usual experiment that shows the first, in words.
     recorded, designed, usual : standard deviations, by the recordings so far; by these and the
         designed recording; by these and a usual motion of the same length.
-    share : with the designed recording, of what the effect explains beside the model, which the
-        nearest rival cannot.
+    share, share_alike : with the designed recording, of what the effect explains beside the model,
+        which the nearest rival cannot; and which the nearest with no more parameters cannot.
     worth : length of usual motion that separates as far, over that of the design; infinite beyond a
         thousand.
     enough : length of the designed motion that decides, over what was asked for; likewise.
@@ -67,13 +69,19 @@ class Separation:
     designed: float
     usual: float
     share: float
+    share_alike: float
     worth: float
     enough: float
 
     @property
     def decides(self) -> bool:
         """Whether their residuals will differ beyond chance nine times in ten, and by enough."""
-        return Told(sigma=self.designed, share=self.share).beyond > 0
+        return self.told.beyond > 0
+
+    @property
+    def told(self) -> Told:
+        """What the recordings tell with the designed one."""
+        return Told(sigma=self.designed, share=self.share, share_alike=self.share_alike)
 
     def sentence(self, length: float) -> str:
         """Say what the recording is worth, in plain words.
@@ -98,7 +106,7 @@ class Separation:
             return words
         if not np.isfinite(self.enough):
             return f"{words} That may not decide, however long it is: {self._alike()}."
-        if self.share <= ALIKE:
+        if self.share_alike <= ALIKE:
             return (
                 f"{words} That may not decide: {self._alike()}; it is predicted to decide from "
                 f"{number(self.enough, 2)} times that length on."
@@ -111,10 +119,10 @@ class Separation:
 
     def _alike(self) -> str:
         """Why many standard deviations may not decide."""
-        if self.share > ALIKE:
+        if self.share_alike > ALIKE:
             return "too little of it is beyond the noise"
         return (
-            f"all but {percent(self.share, 2)} of what it explains is imitated, and up to "
+            f"all but {percent(self.share_alike, 2)} of what it explains is imitated, and up to "
             f"{percent(ALIKE, 1)} a diagnosis may name both"
         )
 
@@ -127,6 +135,7 @@ class Separation:
             "designed": self.designed,
             "usual": self.usual,
             "share": self.share,
+            "share_alike": self.share_alike,
             "decides": self.decides,
             "worth": finite(self.worth),
             "enough": finite(self.enough),
