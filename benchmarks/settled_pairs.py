@@ -9,7 +9,8 @@ that begin in mid-motion; dry friction is its own constraint at odd seeds, and t
 and the diagnosis repeated with it. Printed are, of the cases in which both were named:
 in how many the right effect alone is named afterwards; the separation that was predicted; and that
 which was measured, the square root of the fall of the squared residual, over the noise, from the
-model with the other effect, in the shape in which it imitates most, to that with the right one.
+model with the other effect, in the shape in which it imitates most, to that with the right one:
+least, median and most, over that predicted, and how often it is within the interval of that.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ def main() -> None:
             continue
         model = study.model
         model = model - pair.hidden if pair.hidden in [x.label for x in model.effects] else model
-        both, decides, right, wrong, predicted, found, so_far = 0, 0, 0, 0, [], [], []
+        both, decides, right, wrong, within, predicted, found, so_far = 0, 0, 0, 0, 0, [], [], []
         for seed in range(asked.first, asked.first + asked.seeds):
             made = PLANTS[asked.plant](truth(base, pair, seed))
             recorded = replace(study.train, recordings=made.run())
@@ -169,11 +170,16 @@ def main() -> None:
             decides += separation.decides
             told = separation.designed > 0
             if told and loop.designed.task.tell[meant[0]][0].label == pair.hidden:
-                found.append(measured(loop, recorded, meant[0]) / separation.designed)
+                size = measured(loop, recorded, meant[0])
+                low, high = separation.interval
+                within += low <= size <= high
+                found.append(size / separation.designed)
         middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted)]
-        over = f"{min(found):.2f} to {max(found):.2f}" if found else ""
+        ends = (min(found), np.median(found), max(found)) if found else ()
+        over = ", ".join(f"{one:.2f}" for one in ends)
+        inside = f"{within} of {len(found)}"
         counts = (str(one) for one in (decides, right, wrong))
-        cells = (f"{both} of {asked.seeds}", *counts, *middle, over)
+        cells = (f"{both} of {asked.seeds}", *counts, *middle, over, inside)
         rows.append((pair.hidden, pair.rival, *cells))
         print(rows[-1], flush=True)
     heads = (
@@ -186,6 +192,7 @@ def main() -> None:
         "sigma so far",
         "predicted",
         "measured over it",
+        "within its interval",
     )
     print(Table("Pairs that a designed recording settles", heads, tuple(rows)))
 

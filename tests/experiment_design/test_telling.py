@@ -129,6 +129,7 @@ def separation(designed: float, share: float, enough: float) -> Separation:
         recorded=1.0,
         designed=designed,
         usual=2.0,
+        designed_sigma=0.01 * designed,
         share=share,
         share_alike=share,
         worth=3.0,

@@ -54,6 +54,14 @@ class SearchCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    told_apart: float = criterion(
+        6.5,
+        "1",
+        "standard deviations of the noise from which on two effects are told apart: x apart, the "
+        "squared residuals that they leave differ by x^2, with a standard deviation of 2 x, nine "
+        "times in ten by more than 1.96 of these",
+        over=0,
+    )
     in_common: float = criterion(
         0.25,
         "1",

@@ -132,6 +132,12 @@ class DesignQuestion:
         """Size of the torque's residual, (n,); infinite where there is no torque."""
         return _std(self.estimate)
 
+    @property
+    def effect_covariance(self) -> np.ndarray:
+        """Of the values of the effect that is taken for true, by the recordings so far, (k, k)."""
+        at = self.estimate.model.slices[self.told[0].label]
+        return self.estimate.covariance[at, at]
+
     def asked(self, recorded: Dataset, motions: MotionFamily) -> Asked:
         """Return what a motion is judged by, and the names of what it tells.
 

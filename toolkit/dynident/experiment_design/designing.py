@@ -249,6 +249,7 @@ def _separation(
         usual=rivals.told(known + other).sigma,
         share=told.share,
         share_alike=told.share_alike,
+        designed_sigma=rivals.told_sigma(known + own, question.effect_covariance),
         worth=times_until(lambda k: rivals.told(known + other * k).sigma - told.sigma),
         enough=times_until(lambda k: rivals.told(known + own * k).beyond),
     )

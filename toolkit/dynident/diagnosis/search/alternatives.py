@@ -120,23 +120,30 @@ def _of_the_confidence_set(
     return tuple(
         other.effect
         for k, other in enumerate(rivals, 1)
-        if k in kept
-        or (
-            abs(winner.drop - other.drop) <= criteria.alike * winner.drop
-            and not _less_with_more(other, winner)
-        )
+        if _may_be_instead(other, winner, k in kept, criteria)
     )
 
 
-def _less_with_more(other: Score, winner: Score) -> bool:
-    """Whether a rival explains less than the winner, with more parameters: nothing speaks for it.
+def _may_be_instead(other: Score, winner: Score, likely: bool, criteria: SearchCriteria) -> bool:
+    """Whether a rival may be named beside the winner.
 
-    That a little less may be as much allows for what else is wrong with a model. A law that
-    imitates another one by its further freedom, as a long wave does a ramp, has that already.
-    Columns that are taken at a first guess may explain more than they are seen to.
+    One of the confidence set may be, and one that explains a little less, which allows for what
+    else is wrong with a model. But of one with more parameters more is asked: where it imitates by
+    its further freedom, as a long wave does a ramp, it has that allowance already, and the few
+    blocks of time that a short recording has put nothing out of the set, however far apart the two
+    are there. Columns of a first guess may explain more than they are seen to.
+
+    Parameters
+    ----------
+    other, winner : the two.
+    likely : whether the rival is in the confidence set.
+    criteria : what counts as alike, and as told apart.
     """
-    more = other.parameters > winner.parameters
-    return more and other.drop < winner.drop and other.effect.is_exact
+    less = winner.drop - other.drop
+    larger = other.parameters > winner.parameters and other.effect.is_exact
+    if likely:
+        return not larger or less <= criteria.told_apart**2
+    return abs(less) <= criteria.alike * winner.drop and not (larger and less > 0)
 
 
 def _as_much_once_fitted(

@@ -32,8 +32,8 @@ class TellingMoments:
 
     Attributes
     ----------
-    shared : (p + 1, p + 1) of the model's columns and, last, the torque of the effect.
-    cross : (p + 1, m) of these with the columns of all rivals in all shapes.
+    shared : (p + k, p + k) of the model's columns and, last, those of the effect.
+    cross : (p + k, m) of these with the columns of all rivals in all shapes.
     own : (r, k, k) of the columns of each rival and shape; zero where it has fewer than k.
     """
 
@@ -94,9 +94,7 @@ class Imitations:
     def _of_rows(self, t: np.ndarray, motion: Sequence[np.ndarray]) -> TellingMoments:
         every = self.columns.along(t, *motion)
         size, last = len(self.values), len(self.effect_values)
-        torque = every[:, :, -last:] @ self.effect_values
-        shared = np.concatenate([every[:, :, :size], torque[:, :, None]], axis=2)
-        first = self._white(shared)
+        first = self._white(np.delete(every, np.s_[size:-last], axis=2))
         crossed, own = [], np.zeros((len(self.rivals), self._most, self._most))
         block = self.model.block(t, *motion, carries_payload=self.carries_payload)
         for place, rival in enumerate(self.rivals):
@@ -129,7 +127,27 @@ class Imitations:
 
     def told(self, moments: TellingMoments) -> Told:
         """Return what some rows tell of the rival that imitates the effect best."""
-        shared, cross = moments.shared, moments.cross
+        return self._told(moments, self.effect_values)
+
+    def told_sigma(self, moments: TellingMoments, covariance: np.ndarray) -> float:
+        """Return the standard deviation of `told`'s sigma, as the effect's values are uncertain.
+
+        Parameters
+        ----------
+        moments : of some rows.
+        covariance : (k, k) of the values.
+        """
+        sizes, axes = np.linalg.eigh(covariance)
+        steps = axes * np.sqrt(np.clip(sizes, 0.0, None))
+        ends = ((self.effect_values + s * one for s in (1.0, -1.0)) for one in steps.T)
+        told = [[self._told(moments, one).sigma for one in each] for each in ends]
+        return float(np.linalg.norm([(up - down) / 2 for up, down in told]))
+
+    def _told(self, moments: TellingMoments, effect_values: np.ndarray) -> Told:
+        taken = np.zeros((len(moments.shared), len(self.values) + 1))
+        np.fill_diagonal(taken[: len(self.values)], 1.0)
+        taken[len(self.values) :, -1] = effect_values
+        shared, cross = taken.T @ moments.shared @ taken, taken.T @ moments.cross
         size = np.sqrt(np.diag(shared)[:-1])
         size = np.where(size > 0, size, 1.0)
         known, turn = np.linalg.eigh(shared[:-1, :-1] / np.outer(size, size))

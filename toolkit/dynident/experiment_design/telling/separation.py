@@ -12,16 +12,16 @@ from scipy.optimize import brentq
 from dynident.criteria import DEFAULTS
 from dynident.tables import finite, number, percent
 
-DECIDES = 6.5
-"""Standard deviations that decide. The diagnosis compares the squared residuals that two effects
-leave: x standard deviations apart they differ by x^2, with a standard deviation of 2 x. Nine times
-in ten that is beyond 1.96 of these, the conventional level, where x / 2 > 1.96 + 1.28."""
+DECIDES = DEFAULTS.search.told_apart
+"""Standard deviations that decide, where x / 2 > 1.96 + 1.28: the diagnosis compares the squared
+residuals that two effects leave."""
 ALIKE = DEFAULTS.search.alike
 """Share of what an effect explains up to which a diagnosis names what explains the rest with it,
 however many standard deviations that share is, unless it has more parameters."""
 NEVER = 0.1
 """Standard deviations below which no length of such a motion does."""
 MOST_TIMES = 1000.0
+_ROUGH = 0.1  # of a prediction, from which on its standard deviation is told
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +55,8 @@ class Separation:
     advice : the usual experiment that shows the first, in words.
     recorded, designed, usual : standard deviations, by the recordings so far; by these and the
         designed recording; by these and a usual motion of the same length.
+    designed_sigma : standard deviation of what is predicted for the design, as the recordings so
+        far tell the values of the first.
     share, share_alike : with the designed recording, of what the effect explains beside the model,
         which the nearest rival cannot; and which the nearest with no more parameters cannot.
     worth : length of usual motion that separates as far, over that of the design; infinite beyond a
@@ -68,6 +70,7 @@ class Separation:
     recorded: float
     designed: float
     usual: float
+    designed_sigma: float
     share: float
     share_alike: float
     worth: float
@@ -77,6 +80,16 @@ class Separation:
     def decides(self) -> bool:
         """Whether their residuals will differ beyond chance nine times in ten, and by enough."""
         return self.told.beyond > 0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Standard deviations between which the designed recording tells, with 95 %.
+
+        It has noise, of one standard deviation, and the effect may be larger or smaller than the
+        recordings so far say.
+        """
+        half = 1.96 * float(np.hypot(1.0, self.designed_sigma))
+        return max(self.designed - half, 0.0), self.designed + half
 
     @property
     def told(self) -> Told:
@@ -91,9 +104,12 @@ class Separation:
         length : s, of the designed recording.
         """
         others = " and ".join(self.others)
+        low, high = (number(one, 2) for one in self.interval)
+        rough = self.designed_sigma > _ROUGH * self.designed
+        known = f" ({low} to {high}, as far as its size is known)" if rough else ""
         words = (
             f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 3)} "
-            f"standard deviations; the recordings so far by {number(self.recorded, 3)}"
+            f"standard deviations{known}; the recordings so far by {number(self.recorded, 3)}"
         )
         if self.designed < NEVER:
             return (
@@ -133,6 +149,7 @@ class Separation:
             "others": list(self.others),
             "recorded": self.recorded,
             "designed": self.designed,
+            "interval": [finite(one) for one in self.interval],
             "usual": self.usual,
             "share": self.share,
             "share_alike": self.share_alike,
