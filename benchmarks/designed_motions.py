@@ -34,7 +34,7 @@ from scipy.optimize import minimize
 import dynident as di
 from dynident.effects import effects_of
 from dynident.experiment_design import DesignTask, RecordingDesign
-from dynident.experiment_design.motion_program import MotionProgram
+from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.tables import Table
 
 PROBLEMS = Path(__file__).resolve().parents[1] / "problems"
@@ -66,7 +66,7 @@ def ratios(found: RecordingDesign, count: int) -> tuple[float, float, float, flo
     some = (program.within(program.motions.random(50_000 + k)) for k in range(count))
     losses = sorted((program.loss(one), k) for k, one in enumerate(some) if one is not None)
     spent = time.process_time() - began
-    last, ours = program.information.last, found.motion.loss
+    last, ours = program.information.last, program.loss(found.motion.variables)
     best, median = losses[0][0], losses[len(losses) // 2][0]
     winner = program.within(program.motions.random(50_000 + losses[0][1]))
     with np.errstate(invalid="ignore"):  # what no motion tells is infinite in both
@@ -118,7 +118,9 @@ def by_condition_number(found: RecordingDesign, count: int, evaluations: int) ->
     inside = program.within(ended.x.reshape(best.shape))
     assert inside is not None
     spent = time.process_time() - began
-    return Rival(program.loss(inside), found.sigma(inside), condition(program, inside), spent)
+    # On the grid on which a design is chosen.
+    loss = program.loss(inside, FINER)
+    return Rival(loss, found.sigma(inside), condition(program, inside), spent)
 
 
 def beside(name: str, found: RecordingDesign, rival: Rival, ours: float) -> tuple[str, ...]:

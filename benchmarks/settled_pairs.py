@@ -10,7 +10,8 @@ and the diagnosis repeated with it. Printed are, of the cases in which both were
 in how many the right effect alone is named afterwards; the separation that was predicted; and that
 which was measured, the square root of the fall of the squared residual, over the noise, from the
 model with the other effect, in the shape in which it imitates most, to that with the right one:
-least, median and most, over that predicted, and how often it is within the interval of that.
+least, median and most, over that predicted, and how often it is within the interval of that (of
+the cases in which the right effect was named first, and its size told).
 """
 
 from __future__ import annotations
@@ -146,7 +147,8 @@ def main() -> None:
             continue
         model = study.model
         model = model - pair.hidden if pair.hidden in [x.label for x in model.effects] else model
-        both, decides, right, wrong, within, predicted, found, so_far = 0, 0, 0, 0, 0, [], [], []
+        both, decides, right, wrong, within, intervals = 0, 0, 0, 0, 0, 0
+        predicted, found, so_far = [], [], []
         for seed in range(asked.first, asked.first + asked.seeds):
             made = PLANTS[asked.plant](truth(base, pair, seed))
             recorded = replace(study.train, recordings=made.run())
@@ -171,13 +173,15 @@ def main() -> None:
             told = separation.designed > 0
             if told and loop.designed.task.tell[meant[0]][0].label == pair.hidden:
                 size = measured(loop, recorded, meant[0])
-                low, high = separation.interval
-                within += low <= size <= high
                 found.append(size / separation.designed)
+                if separation.predicted.interval:
+                    low, high = separation.predicted.interval
+                    within += low <= size <= high
+                    intervals += 1
         middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted)]
         ends = (min(found), np.median(found), max(found)) if found else ()
         over = ", ".join(f"{one:.2f}" for one in ends)
-        inside = f"{within} of {len(found)}"
+        inside = f"{within} of {intervals}"
         counts = (str(one) for one in (decides, right, wrong))
         cells = (f"{both} of {asked.seeds}", *counts, *middle, over, inside)
         rows.append((pair.hidden, pair.rival, *cells))

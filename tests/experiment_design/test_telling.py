@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from dynident.criteria import DEFAULTS
 from dynident.effects import effects_of
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.telling.imitations import Imitations, shapes_of
-from dynident.experiment_design.telling.separation import ALIKE, DECIDES, Separation, Told
+from dynident.experiment_design.telling.separation import (
+    ALIKE,
+    DECIDES,
+    SEEN,
+    Predicted,
+    Separation,
+    Told,
+)
 from dynident.model import Model
 from synthetic import arm, true_values
 
@@ -109,7 +119,9 @@ def test_what_the_model_explains_is_told_from_nothing() -> None:
         shapes=0,
     )
     t, moved = motion()
-    assert found.told(found.moments(t, moved)) == Told(sigma=0.0, share=0.0, share_alike=0.0)
+    assert found.told(found.moments(t, moved)) == Told(
+        sigma=0.0, share=0.0, share_alike=0.0, seen=0.0
+    )
 
 
 def test_the_least_that_decides_is_what_a_comparison_of_squares_can_tell() -> None:
@@ -121,17 +133,17 @@ def test_the_least_that_decides_is_what_a_comparison_of_squares_can_tell() -> No
     assert np.mean(more / (2 * DECIDES) > 1.96) == pytest.approx(0.9, abs=0.02)
 
 
-def separation(designed: float, share: float, enough: float) -> Separation:
+def separation(
+    designed: float, share: float, enough: float, seen: float = np.inf, chance: float = 1.0
+) -> Separation:
     return Separation(
         first="drag",
         others=("spring",),
         advice="",
         recorded=1.0,
-        designed=designed,
         usual=2.0,
-        designed_sigma=0.01 * designed,
-        share=share,
-        share_alike=share,
+        predicted=Predicted(interval=(0.8 * designed, 1.2 * designed), chance=chance),
+        told=Told(sigma=designed, share=0.5 * share, share_alike=share, seen=seen),
         worth=3.0,
         enough=enough,
     )
@@ -153,3 +165,63 @@ def test_what_decides_is_said() -> None:
     assert not alike.decides
     assert "may name both" in alike.sentence(8.0)
     assert alike.to_dict()["enough"] is None and alike.to_dict()["decides"] is False
+
+
+@pytest.mark.parametrize(
+    ("values", "variances"),
+    [((2.0, 0.5), (0.04, 0.02)), ((0.2, 0.5), (1.0, 1e-4)), ((0.0, 0.5), (1.0, 1e-4))],
+)
+def test_a_prediction_is_as_uncertain_as_the_values_of_the_effect(values, variances) -> None:
+    """Of truths that recordings leave open, what is measured lies within in 95 % of the cases."""
+    found, (t, moved) = imitations(SPRING, DRAG), motion()
+    forms = found.forms(found.moments(t, moved))
+    low, high = forms.predicted(np.array(values), np.diag(variances)).interval
+    rng = np.random.default_rng(1)
+    truths = rng.multivariate_normal(values, np.diag(variances), 1000)
+    measured = [forms.told(one).sigma + rng.standard_normal() for one in truths]
+    assert np.mean([low <= abs(one) <= high for one in measured]) == pytest.approx(0.95, abs=0.02)
+
+
+def test_what_may_be_small_may_not_decide() -> None:
+    found, (t, moved) = imitations(SPRING, DRAG), motion()
+    forms, values = found.forms(found.moments(t, moved)), np.array(SIZES[SPRING.label])
+    assert forms.told(values).beyond > 0
+    assert forms.predicted(values, 1e-4 * np.diag(values**2)).chance == 1.0
+    assert (
+        forms.predicted(values, 1e4 * np.diag(values**2)).chance > 0.9
+    )  # as large with either sign
+    assert 0.05 < forms.predicted(0.003 * values, np.diag((0.01 * values) ** 2)).chance < 0.9
+    assert forms.predicted(values, None).interval is None
+    assert forms.predicted(values, None).chance == 0.0
+
+
+def test_an_uncertain_prediction_is_told_with_its_interval() -> None:
+    one = separation(50.0, 0.2, 0.1)
+    assert "by 50 standard deviations (95 %: 40 to 60); the" in one.sentence(8.0)
+    assert one.to_dict()["interval"] == pytest.approx([40.0, 60.0])
+    small = separation(50.0, 0.2, 0.1, chance=0.7)
+    assert not small.decides and "may be smaller than it seems" in small.sentence(8.0)
+    unknown = replace(small, predicted=Predicted(interval=None, chance=0.0))
+    assert not unknown.decides and "do not tell" in unknown.sentence(8.0)
+    assert unknown.to_dict()["interval"] is None
+
+
+def test_a_larger_rival_is_told_where_the_missing_effect_counts_as_noise() -> None:
+    """As a diagnosis sees it: the greater the effect, the more noise there is until it is added."""
+    t, moved = motion()
+    one = imitations(SPRING, RIPPLE)
+    forms = one.forms(one.moments(t, moved))
+    small, large = (forms.told(s * one.effect_values) for s in (1.0, 1e3))
+    assert large.sigma == pytest.approx(1e3 * small.sigma, rel=1e-6)
+    assert large.seen < np.sqrt(large.share * forms.rows) * (1 + 1e-6)
+    assert forms.told(1e-6 * one.effect_values).seen == pytest.approx(1e-6 * small.sigma, rel=1e-3)
+    assert separation(50.0, 1.0, 0.1, seen=1.01 * SEEN).decides
+    hidden = separation(50.0, 1.0, 2.0, seen=0.99 * SEEN)
+    assert not hidden.decides and "counts it as noise" in hidden.sentence(8.0)
+    assert "from 2 times that length on" in hidden.sentence(8.0)
+
+
+def test_what_is_seen_differs_beyond_chance_nine_times_in_ten() -> None:
+    noise = np.random.default_rng(0).normal(size=20_000)
+    more = (noise + SEEN) ** 2 - noise**2
+    assert np.mean(more > DEFAULTS.search.told_apart**2) == pytest.approx(0.9, abs=0.01)

@@ -87,18 +87,24 @@ def scored(label: str, drop: float, loss: float) -> Score:
 @pytest.mark.parametrize(
     ("rival", "drop", "loss", "named"),
     [
-        ("torque_ripple@shoulder", 995.0, 2.0, False),  # less, with a shape besides
-        ("torque_ripple@shoulder", 1005.0, 2.0, True),
-        ("torque_offset@shoulder", 995.0, 2.0, True),  # less with less: what else is wrong may do
-        ("joint_zero@shoulder", 995.0, 2.0, True),  # its column is that of a first guess
-        # Blocks of time do not tell these: noise does, where the difference is beyond it.
-        ("torque_ripple@shoulder", 1000.0 - 0.9 * 6.5**2, 1.0, True),
-        ("torque_ripple@shoulder", 1000.0 - 1.1 * 6.5**2, 1.0, False),
-        ("torque_offset@shoulder", 1000.0 - 1.1 * 6.5**2, 1.0, True),
+        # Less, beyond noise and not by much, with a shape besides.
+        ("torque_ripple@shoulder", 2000.0 - 1.1 * 3.92**2, 2.0, False),
+        ("torque_ripple@shoulder", 2000.0 - 0.9 * 3.92**2, 2.0, True),
+        # With less: what else is wrong may do that.
+        ("torque_offset@shoulder", 2000.0 - 1.1 * 3.92**2, 2.0, True),
+        # As many parameters.
+        ("asymmetric_friction@shoulder", 2000.0 - 1.1 * 3.92**2, 2.0, True),
+        # Its columns are those of a first guess.
+        ("joint_zero@shoulder", 2000.0 - 1.1 * 3.92**2, 2.0, True),
+        ("torque_ripple@shoulder", 1900.0, 2.0, False),
+        # Blocks of time do not tell these.
+        ("torque_ripple@shoulder", 2000.0 - 0.9 * 3.92**2, 1.0, True),
+        ("torque_ripple@shoulder", 2000.0 - 1.1 * 3.92**2, 1.0, False),
+        ("torque_offset@shoulder", 1900.0, 1.0, True),
     ],
 )
 def test_of_what_has_more_parameters_more_is_asked(rival, drop, loss, named) -> None:
     evidence = evidence_of((DRAG, 0.1))
-    winner, other = scored("joint_spring@shoulder", 1000.0, 1.0), scored(rival, drop, loss)
+    winner, other = scored("joint_spring@shoulder", 2000.0, 1.0), scored(rival, drop, loss)
     ranking = Ranking((winner, other), 2, ("", ""))
     assert as_likely(evidence, fit_evidence(evidence, PLAIN), ranking) == [other] * named

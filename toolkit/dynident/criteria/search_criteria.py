@@ -49,17 +49,17 @@ class SearchCriteria(CriteriaGroup):
         0.015,
         "1",
         "relative difference of what two effects explain, up to which they are indistinguishable, "
-        "unless the one that explains less has more parameters",
+        "unless the one that explains less has more parameters (`told_apart`)",
         TWO_LINK_CASES,
         least=0,
         most=1,
     )
     told_apart: float = criterion(
-        6.5,
+        3.92,
         "1",
-        "standard deviations of the noise from which on two effects are told apart: x apart, the "
-        "squared residuals that they leave differ by x^2, with a standard deviation of 2 x, nine "
-        "times in ten by more than 1.96 of these",
+        "standard deviations from which on an effect is told from one with more parameters, whose "
+        "columns do not depend on the fit: x apart, the squared residuals that they leave differ "
+        "by x^2, with a standard deviation of 2 x, and beyond chance from 1.96 of these on",
         over=0,
     )
     in_common: float = criterion(

@@ -133,10 +133,15 @@ class DesignQuestion:
         return _std(self.estimate)
 
     @property
-    def effect_covariance(self) -> np.ndarray:
-        """Of the values of the effect that is taken for true, by the recordings so far, (k, k)."""
+    def effect_covariance(self) -> np.ndarray | None:
+        """Of the values of the effect that is taken for true, (k, k); None where they are open.
+
+        The recordings so far may tell them with others only, or not at all.
+        """
         at = self.estimate.model.slices[self.told[0].label]
-        return self.estimate.covariance[at, at]
+        found = self.estimate.covariance[at, at]
+        told = self.estimate.alone[at].all() and np.isfinite(found).all() and np.any(found)
+        return found if told else None
 
     def asked(self, recorded: Dataset, motions: MotionFamily) -> Asked:
         """Return what a motion is judged by, and the names of what it tells.

@@ -238,18 +238,17 @@ def _separation(
     own, other = (
         rivals.moments(t, program.motions.trajectory(one).at(t), asked.rows) for one in motions
     )
-    told = rivals.told(known + own)
+    forms = rivals.forms(known + own)
+    told = forms.told(rivals.effect_values)
     first, *others = question.told
     return Separation(
         first=first.title,
         others=tuple(one.title for one in others),
         advice=first.advice,
         recorded=rivals.told(known).sigma,
-        designed=told.sigma,
         usual=rivals.told(known + other).sigma,
-        share=told.share,
-        share_alike=told.share_alike,
-        designed_sigma=rivals.told_sigma(known + own, question.effect_covariance),
+        predicted=forms.predicted(rivals.effect_values, question.effect_covariance),
+        told=told,
         worth=times_until(lambda k: rivals.told(known + other * k).sigma - told.sigma),
         enough=times_until(lambda k: rivals.told(known + own * k).beyond),
     )

@@ -128,10 +128,12 @@ def _may_be_instead(other: Score, winner: Score, likely: bool, criteria: SearchC
     """Whether a rival may be named beside the winner.
 
     One of the confidence set may be, and one that explains a little less, which allows for what
-    else is wrong with a model. But of one with more parameters more is asked: where it imitates by
-    its further freedom, as a long wave does a ramp, it has that allowance already, and the few
-    blocks of time that a short recording has put nothing out of the set, however far apart the two
-    are there. Columns of a first guess may explain more than they are seen to.
+    else is wrong with a model. But one with more parameters must not explain less than the winner
+    beyond chance: what imitates by its further freedom, as a long wave does a ramp, has that
+    allowance already, and the few blocks of time of a short recording put nothing out of the set,
+    however far apart the two are there. What is missing counts as noise here, so that where much is
+    left beside the winner, too, the rival stays. Columns of a first guess may explain more than
+    they are seen to: such a rival stays as well.
 
     Parameters
     ----------
@@ -141,9 +143,9 @@ def _may_be_instead(other: Score, winner: Score, likely: bool, criteria: SearchC
     """
     less = winner.drop - other.drop
     larger = other.parameters > winner.parameters and other.effect.is_exact
-    if likely:
-        return not larger or less <= criteria.told_apart**2
-    return abs(less) <= criteria.alike * winner.drop and not (larger and less > 0)
+    if larger and less > criteria.told_apart**2:
+        return False
+    return likely or abs(less) <= criteria.alike * winner.drop
 
 
 def _as_much_once_fitted(

@@ -15,6 +15,7 @@ import numpy as np
 
 from dynident.effects import Effect, ShapeParameter
 from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.telling.predictions import TellingForms
 from dynident.experiment_design.telling.separation import Told
 from dynident.model import Model
 from dynident.robot import Robot
@@ -34,20 +35,27 @@ class TellingMoments:
     ----------
     shared : (p + k, p + k) of the model's columns and, last, those of the effect.
     cross : (p + k, m) of these with the columns of all rivals in all shapes.
-    own : (r, k, k) of the columns of each rival and shape; zero where it has fewer than k.
+    own : (r, l, l) of the columns of each rival and shape; zero where it has fewer than l.
+    rows : of torque that the effect acts on.
     """
 
     shared: np.ndarray
     cross: np.ndarray
     own: np.ndarray
+    rows: float
 
     def __add__(self, other: TellingMoments) -> TellingMoments:
         return TellingMoments(
-            self.shared + other.shared, self.cross + other.cross, self.own + other.own
+            self.shared + other.shared,
+            self.cross + other.cross,
+            self.own + other.own,
+            self.rows + other.rows,
         )
 
     def __mul__(self, factor: float) -> TellingMoments:
-        return TellingMoments(factor * self.shared, factor * self.cross, factor * self.own)
+        return TellingMoments(
+            factor * self.shared, factor * self.cross, factor * self.own, factor * self.rows
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -102,7 +110,8 @@ class Imitations:
             white, count = self._white(found), found.shape[2]
             crossed.append(first.T @ white)
             own[place, :count, :count] = white.T @ white
-        return TellingMoments(first.T @ first, np.hstack(crossed), own)
+        acts = np.any(every[:, :, -last:], axis=(0, 2)) & np.isfinite(self.std)
+        return TellingMoments(first.T @ first, np.hstack(crossed), own, len(t) * int(acts.sum()))
 
     def _white(self, columns: np.ndarray) -> np.ndarray:
         return (columns / self.std[None, :, None]).reshape(-1, columns.shape[2])
@@ -115,7 +124,7 @@ class Imitations:
     def _is_larger(self) -> np.ndarray:
         """Whether a rival has more parameters, and columns that a diagnosis sees as they are, (r,).
 
-        A diagnosis names no such rival that explains less.
+        A diagnosis names no such rival that explains less, beyond chance.
         """
         sizes = np.array(self._counts) + [len(one.shape) for one in self.rivals]
         own = len(self.effect_values) + self.shapes
@@ -127,63 +136,48 @@ class Imitations:
 
     def told(self, moments: TellingMoments) -> Told:
         """Return what some rows tell of the rival that imitates the effect best."""
-        return self._told(moments, self.effect_values)
+        return self.forms(moments).told(self.effect_values)
 
-    def told_sigma(self, moments: TellingMoments, covariance: np.ndarray) -> float:
-        """Return the standard deviation of `told`'s sigma, as the effect's values are uncertain.
-
-        Parameters
-        ----------
-        moments : of some rows.
-        covariance : (k, k) of the values.
-        """
-        sizes, axes = np.linalg.eigh(covariance)
-        steps = axes * np.sqrt(np.clip(sizes, 0.0, None))
-        ends = ((self.effect_values + s * one for s in (1.0, -1.0)) for one in steps.T)
-        told = [[self._told(moments, one).sigma for one in each] for each in ends]
-        return float(np.linalg.norm([(up - down) / 2 for up, down in told]))
-
-    def _told(self, moments: TellingMoments, effect_values: np.ndarray) -> Told:
-        taken = np.zeros((len(moments.shared), len(self.values) + 1))
-        np.fill_diagonal(taken[: len(self.values)], 1.0)
-        taken[len(self.values) :, -1] = effect_values
-        shared, cross = taken.T @ moments.shared @ taken, taken.T @ moments.cross
-        size = np.sqrt(np.diag(shared)[:-1])
+    def forms(self, moments: TellingMoments) -> TellingForms:
+        """Return what some rows tell of an effect of any values."""
+        shared, cross, p = moments.shared, moments.cross, len(self.values)
+        size = np.sqrt(np.diag(shared)[:p])
         size = np.where(size > 0, size, 1.0)
-        known, turn = np.linalg.eigh(shared[:-1, :-1] / np.outer(size, size))
+        known, turn = np.linalg.eigh(shared[:p, :p] / np.outer(size, size))
         kept = known > _ROUNDING * max(known[-1], 0.0) if len(known) else np.zeros(0, bool)
         # Whitened coordinates of what the model takes away from the others.
-        taken = (turn[:, kept] / np.sqrt(known[kept])).T / size
-        of_torque, of_rivals = taken @ shared[:-1, -1], taken @ cross[:-1]
-        alone = float(shared[-1, -1] - of_torque @ of_torque)
-        if alone <= _ROUNDING * shared[-1, -1]:
-            return Told(sigma=0.0, share=0.0, share_alike=0.0)
-        beside = cross[-1] - of_torque @ of_rivals
+        cleared = (turn[:, kept] / np.sqrt(known[kept])).T / size
+        of_effect, of_rivals = cleared @ shared[:p, p:], cleared @ cross[:p]
+        whole = shared[p:, p:]
+        alone, beside = whole - of_effect.T @ of_effect, cross[p:] - of_effect.T @ of_rivals
+        torque = float(self.effect_values @ whole @ self.effect_values)
+        largest = np.sqrt(max(np.diag(shared)[:p].max(initial=0.0), torque))
         left, start = [], 0
-        for count, whole in zip(self._counts, moments.own, strict=True):
+        for count, products in zip(self._counts, moments.own, strict=True):
             at = slice(start, start + count)
             start += count
-            own = whole[:count, :count] - of_rivals[:, at].T @ of_rivals[:, at]
-            sizes = np.sqrt(np.diag(whole)[:count])
-            seen = sizes > _UNSEEN * np.sqrt(np.diag(shared).max())
+            own = products[:count, :count] - of_rivals[:, at].T @ of_rivals[:, at]
+            sizes = np.sqrt(np.diag(products)[:count])
+            seen = sizes > _UNSEEN * largest
             own, sizes = own[np.ix_(seen, seen)], sizes[seen]
-            left.append(alone - _explained(own, beside[at][seen], sizes))
-        rest = np.array(left)
-        rest = np.where(rest > _ROUNDING * shared[-1, -1], rest, 0.0)
-        alike = rest[~self._is_larger].min(initial=alone)
-        return Told(
-            sigma=float(np.sqrt(rest.min())), share=rest.min() / alone, share_alike=alike / alone
+            left.append(alone - _explained(own, beside[:, at][:, seen], sizes))
+        return TellingForms(
+            whole=whole,
+            alone=alone,
+            left=np.array(left),
+            larger=self._is_larger,
+            rows=moments.rows,
         )
 
 
-def _explained(own: np.ndarray, beside: np.ndarray, size: np.ndarray) -> float:
-    """Square that columns explain, from their products with themselves and with the torque."""
+def _explained(own: np.ndarray, beside: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Squares that columns explain, from their products with themselves and with others, (k, k)."""
     if not len(size):
-        return 0.0
+        return np.zeros((len(beside), len(beside)))
     values, turn = np.linalg.eigh(own / np.outer(size, size))
     seen = values > _ROUNDING
-    along = turn[:, seen].T @ (beside / size)
-    return float(np.sum(along**2 / values[seen]))
+    along = (beside / size) @ turn[:, seen] / np.sqrt(values[seen])
+    return along @ along.T
 
 
 def shapes_of(rivals: Sequence[Effect], robot: Robot) -> tuple[Effect, ...]:

@@ -12,16 +12,21 @@ from scipy.optimize import brentq
 from dynident.criteria import DEFAULTS
 from dynident.tables import finite, number, percent
 
-DECIDES = DEFAULTS.search.told_apart
-"""Standard deviations that decide, where x / 2 > 1.96 + 1.28: the diagnosis compares the squared
-residuals that two effects leave."""
+DECIDES = 6.5
+"""Standard deviations that decide. The diagnosis compares the squared residuals that two effects
+leave: x standard deviations apart they differ by x^2, with a standard deviation of 2 x. Nine times
+in ten that is beyond 1.96 of these, the conventional level, where x / 2 > 1.96 + 1.28."""
+SEEN = 1.28 + float(np.hypot(1.28, DEFAULTS.search.told_apart))
+"""Of a rival with more parameters, where the effect counts as noise as long as it is missing: from
+here on x^2 is beyond the difference that a diagnosis asks for, nine times in ten."""
 ALIKE = DEFAULTS.search.alike
 """Share of what an effect explains up to which a diagnosis names what explains the rest with it,
 however many standard deviations that share is, unless it has more parameters."""
 NEVER = 0.1
 """Standard deviations below which no length of such a motion does."""
 MOST_TIMES = 1000.0
-_ROUGH = 0.1  # of a prediction, from which on its standard deviation is told
+SURE = 0.9
+"""Chance from which on a recording is said to decide, whatever the size of the effect may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,17 +37,41 @@ class Told:
     ----------
     sigma : standard deviations by which the effect is told from it.
     share : of what the effect explains beside the model, which the rival cannot.
-    share_alike : the same of the nearest rival with no more parameters; 1 where all have more.
+    share_alike : the same of the nearest of those rivals that have no more parameters, or columns
+        that a diagnosis takes at a first guess; 1 where there is none.
+    seen : standard deviations by which it is told from the nearest of the others, where the effect
+        is missing and counts as noise; infinite where there is none.
     """
 
     sigma: float
     share: float
     share_alike: float
+    seen: float
 
     @property
     def beyond(self) -> float:
         """By how much, of what a decision needs, that is exceeded; below zero it is not reached."""
-        return min(self.sigma / DECIDES, self.share_alike / ALIKE) - 1.0
+        return float(self.beyond_of(*np.array([self.sigma, self.share_alike, self.seen])))
+
+    @staticmethod
+    def beyond_of(sigma: np.ndarray, share_alike: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """`beyond` of many, (d,)."""
+        return np.minimum.reduce([sigma / DECIDES, share_alike / ALIKE, seen / SEEN]) - 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predicted:
+    """What a designed recording will tell, as the recordings so far leave the effect's values open.
+
+    Attributes
+    ----------
+    interval : standard deviations between which that lies, with 95 %: the recording has noise, and
+        the effect may be larger or smaller; None where its size is not known.
+    chance : with which it decides.
+    """
+
+    interval: tuple[float, float] | None
+    chance: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +82,10 @@ class Separation:
     ----------
     first, others : the effect that is taken for true, and its rivals.
     advice : the usual experiment that shows the first, in words.
-    recorded, designed, usual : standard deviations, by the recordings so far; by these and the
-        designed recording; by these and a usual motion of the same length.
-    designed_sigma : standard deviation of what is predicted for the design, as the recordings so
-        far tell the values of the first.
-    share, share_alike : with the designed recording, of what the effect explains beside the model,
-        which the nearest rival cannot; and which the nearest with no more parameters cannot.
+    recorded, usual : standard deviations, by the recordings so far; by these and a usual motion of
+        the same length as the design.
+    predicted : what the design will tell, as far as the size of the first is known.
+    told : what it tells if the first has the size that the recordings so far say.
     worth : length of usual motion that separates as far, over that of the design; infinite beyond a
         thousand.
     enough : length of the designed motion that decides, over what was asked for; likewise.
@@ -68,33 +95,21 @@ class Separation:
     others: tuple[str, ...]
     advice: str
     recorded: float
-    designed: float
     usual: float
-    designed_sigma: float
-    share: float
-    share_alike: float
+    predicted: Predicted
+    told: Told
     worth: float
     enough: float
 
     @property
+    def designed(self) -> float:
+        """Standard deviations, by the recordings so far and the designed one."""
+        return self.told.sigma
+
+    @property
     def decides(self) -> bool:
         """Whether their residuals will differ beyond chance nine times in ten, and by enough."""
-        return self.told.beyond > 0
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Standard deviations between which the designed recording tells, with 95 %.
-
-        It has noise, of one standard deviation, and the effect may be larger or smaller than the
-        recordings so far say.
-        """
-        half = 1.96 * float(np.hypot(1.0, self.designed_sigma))
-        return max(self.designed - half, 0.0), self.designed + half
-
-    @property
-    def told(self) -> Told:
-        """What the recordings tell with the designed one."""
-        return Told(sigma=self.designed, share=self.share, share_alike=self.share_alike)
+        return self.told.beyond > 0 and self.predicted.chance >= SURE
 
     def sentence(self, length: float) -> str:
         """Say what the recording is worth, in plain words.
@@ -104,12 +119,10 @@ class Separation:
         length : s, of the designed recording.
         """
         others = " and ".join(self.others)
-        low, high = (number(one, 2) for one in self.interval)
-        rough = self.designed_sigma > _ROUGH * self.designed
-        known = f" ({low} to {high}, as far as its size is known)" if rough else ""
         words = (
             f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 3)} "
-            f"standard deviations{known}; the recordings so far by {number(self.recorded, 3)}"
+            f"standard deviations ({self._as_known()}); the recordings so far by "
+            f"{number(self.recorded, 3)}"
         )
         if self.designed < NEVER:
             return (
@@ -120,26 +133,40 @@ class Separation:
         words += f"; a usual motion needs {needs}."
         if self.decides:
             return words
+        if self.told.beyond > 0:
+            return f"{words} That may not decide: the effect may be smaller than it seems so far."
         if not np.isfinite(self.enough):
             return f"{words} That may not decide, however long it is: {self._alike()}."
-        if self.share_alike <= ALIKE:
+        if self.told.sigma < DECIDES and self.told.share_alike > ALIKE:
             return (
-                f"{words} That may not decide: {self._alike()}; it is predicted to decide from "
-                f"{number(self.enough, 2)} times that length on."
+                f"{words} That does not decide: {DECIDES:g}, from which on the residuals that they "
+                f"leave differ beyond chance nine times in ten, take {number(self.enough, 2)} "
+                "times as long."
             )
         return (
-            f"{words} That does not decide: {DECIDES:g}, from which on the residuals that they "
-            f"leave differ beyond chance nine times in ten, take {number(self.enough, 2)} times as "
-            "long."
+            f"{words} That may not decide: {self._alike()}; it is predicted to decide from "
+            f"{number(self.enough, 2)} times that length on."
         )
+
+    def _as_known(self) -> str:
+        """Between which limits that lies, in words."""
+        if self.predicted.interval is None:
+            return "if it is as large as it seems, which the recordings so far do not tell"
+        low, high = (number(one, 3) for one in self.predicted.interval)
+        return f"95 %: {low} to {high}"
 
     def _alike(self) -> str:
         """Why many standard deviations may not decide."""
-        if self.share_alike > ALIKE:
+        if self.told.share_alike <= ALIKE:
+            return (
+                f"all but {percent(self.told.share_alike, 2)} of what it explains is imitated, and "
+                f"up to {percent(ALIKE, 1)} a diagnosis may name both"
+            )
+        if self.told.sigma < DECIDES:
             return "too little of it is beyond the noise"
         return (
-            f"all but {percent(self.share_alike, 2)} of what it explains is imitated, and up to "
-            f"{percent(ALIKE, 1)} a diagnosis may name both"
+            f"all but {percent(self.told.share, 2)} of what it explains is imitated, and where it "
+            "is missing a diagnosis counts it as noise"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -149,10 +176,11 @@ class Separation:
             "others": list(self.others),
             "recorded": self.recorded,
             "designed": self.designed,
-            "interval": [finite(one) for one in self.interval],
+            "interval": self.predicted.interval and list(self.predicted.interval),
+            "chance": self.predicted.chance,
             "usual": self.usual,
-            "share": self.share,
-            "share_alike": self.share_alike,
+            "share": self.told.share,
+            "share_alike": self.told.share_alike,
             "decides": self.decides,
             "worth": finite(self.worth),
             "enough": finite(self.enough),
