@@ -13,7 +13,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynident.criteria import SearchCriteria
 from dynident.diagnosis.search.confidence_set import as_good_as_first
 from dynident.diagnosis.search.payload_recordings import with_payload
 from dynident.diagnosis.search.ranking import Ranking
@@ -40,12 +39,11 @@ def as_likely(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> list
     -------
     Those of the model confidence set, and those that explain as much. They may be present besides.
     """
-    best, *others = ranking.passing
     likely = {
-        *_of_the_confidence_set(ranking, best, evidence.criteria.search),
+        *_of_the_confidence_set(evidence, fitted, ranking),
         *_as_much_once_fitted(evidence, fitted, ranking),
     }
-    return [one for one in others if one.effect in likely]
+    return [one for one in ranking.passing[1:] if one.effect in likely]
 
 
 def alternatives(
@@ -90,24 +88,24 @@ def _drop(evidence: Evidence, fitted: EvidenceFit, one: Score) -> float:
 
 
 def _of_the_confidence_set(
-    ranking: Ranking, winner: Score, criteria: SearchCriteria
+    evidence: Evidence, fitted: EvidenceFit, ranking: Ranking
 ) -> tuple[Effect, ...]:
     """Effects of the model confidence set of all that pass, and those that explain as much.
 
     Parameters
     ----------
-    ranking, winner : of a round, and its best effect.
-    criteria : what counts as alike.
+    evidence, fitted : the data, and the model as it fits them.
+    ranking : of a round, the winner first.
 
     Returns
     -------
     Without the winner. An effect that contains it and adds nothing to it is not named.
     """
+    winner, *others = ranking.passing
     rivals = [
         other
-        for other in ranking.passing
+        for other in others
         if other.losses is not None
-        and other.effect != winner.effect
         and not (
             other.effect.joint == winner.effect.joint
             and winner.effect.name in other.effect.contains
@@ -115,37 +113,54 @@ def _of_the_confidence_set(
     ]
     if not rivals:
         return ()
+    criteria = evidence.criteria.search
     losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
     kept = as_good_as_first(losses, criteria)
-    return tuple(
-        other.effect
+    named = [
+        other
         for k, other in enumerate(rivals, 1)
-        if _may_be_instead(other, winner, k in kept, criteria)
-    )
+        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
+    ]
+    apart = _told_apart(evidence, fitted, winner, [one for one in named if _is_larger(one, winner)])
+    return tuple(one.effect for one in named if one.effect not in apart)
 
 
-def _may_be_instead(other: Score, winner: Score, likely: bool, criteria: SearchCriteria) -> bool:
-    """Whether a rival may be named beside the winner.
+def _is_larger(other: Score, winner: Score) -> bool:
+    """Whether a rival has more parameters that the data tell, and columns that are as they are.
 
-    One of the confidence set may be, and one that explains a little less, which allows for what
-    else is wrong with a model. But one with more parameters must not explain less than the winner
-    beyond chance: what imitates by its further freedom, as a long wave does a ramp, has that
-    allowance already, and the few blocks of time of a short recording put nothing out of the set,
-    however far apart the two are there. What is missing counts as noise here, so that where much is
-    left beside the winner, too, the rival stays. Columns of a first guess may explain more than
-    they are seen to: such a rival stays as well.
+    Columns of a first guess may explain more than they are seen to.
+    """
+    more = other.rank + len(other.effect.shape) > winner.rank + len(winner.effect.shape)
+    carried = {one.payload_recordings is not None for one in (other, winner)}
+    return more and other.effect.is_exact and carried == {False}
+
+
+def _told_apart(
+    evidence: Evidence, fitted: EvidenceFit, winner: Score, larger: Sequence[Score]
+) -> set[Effect]:
+    """Rivals with more parameters that, once fitted, explain less than the winner beyond chance.
+
+    What imitates by its further freedom, as a long wave does a ramp, comes within the per cent that
+    allows for what else is wrong with a model; and the few blocks of time of a short recording put
+    nothing out of the confidence set, however far apart the two are there. Here it is the noise
+    that tells, with all that is left beside the winner: where more is wrong than the two differ by,
+    the rival stays.
 
     Parameters
     ----------
-    other, winner : the two.
-    likely : whether the rival is in the confidence set.
-    criteria : what counts as alike, and as told apart.
+    evidence, fitted : the data, and the model without either.
+    winner, larger : the effect, and the rivals.
     """
-    less = winner.drop - other.drop
-    larger = other.parameters > winner.parameters and other.effect.is_exact
-    if larger and less > criteria.told_apart**2:
-        return False
-    return likely or abs(less) <= criteria.alike * winner.drop
+    if not larger:
+        return set()
+    rows = fitted.rows / fitted.model.robot.n
+    wider = fit_evidence(evidence, fitted.model + winner.effect, fitted)
+    left = rows * wider.misfit(wider)
+    least = left + evidence.criteria.search.told_apart**2
+    instead = {
+        one.effect: fit_evidence(evidence, fitted.model + one.effect, fitted) for one in larger
+    }
+    return {effect for effect, fit in instead.items() if rows * fit.misfit(wider) - left > least}
 
 
 def _as_much_once_fitted(

@@ -36,26 +36,21 @@ class TellingMoments:
     shared : (p + k, p + k) of the model's columns and, last, those of the effect.
     cross : (p + k, m) of these with the columns of all rivals in all shapes.
     own : (r, l, l) of the columns of each rival and shape; zero where it has fewer than l.
-    rows : of torque that the effect acts on.
     """
 
     shared: np.ndarray
     cross: np.ndarray
     own: np.ndarray
-    rows: float
 
     def __add__(self, other: TellingMoments) -> TellingMoments:
         return TellingMoments(
             self.shared + other.shared,
             self.cross + other.cross,
             self.own + other.own,
-            self.rows + other.rows,
         )
 
     def __mul__(self, factor: float) -> TellingMoments:
-        return TellingMoments(
-            factor * self.shared, factor * self.cross, factor * self.own, factor * self.rows
-        )
+        return TellingMoments(factor * self.shared, factor * self.cross, factor * self.own)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,8 +105,7 @@ class Imitations:
             white, count = self._white(found), found.shape[2]
             crossed.append(first.T @ white)
             own[place, :count, :count] = white.T @ white
-        acts = np.any(every[:, :, -last:], axis=(0, 2)) & np.isfinite(self.std)
-        return TellingMoments(first.T @ first, np.hstack(crossed), own, len(t) * int(acts.sum()))
+        return TellingMoments(first.T @ first, np.hstack(crossed), own)
 
     def _white(self, columns: np.ndarray) -> np.ndarray:
         return (columns / self.std[None, :, None]).reshape(-1, columns.shape[2])
@@ -166,7 +160,6 @@ class Imitations:
             alone=alone,
             left=np.array(left),
             larger=self._is_larger,
-            rows=moments.rows,
         )
 
 

@@ -24,14 +24,12 @@ class TellingForms:
     left : (r, k, k) of what of that a rival, in one of its shapes, cannot.
     larger : (r,) whether that rival has more parameters, and columns that a diagnosis sees as they
         are.
-    rows : of torque that the effect acts on.
     """
 
     whole: np.ndarray
     alone: np.ndarray
     left: np.ndarray
     larger: np.ndarray
-    rows: float
 
     def told(self, values: np.ndarray) -> Told:
         """Return what is told of the rival that imitates an effect of these values best.
@@ -40,8 +38,8 @@ class TellingForms:
         ----------
         values : (k,) of the effect.
         """
-        sigma, share, alike, seen = (float(one[0]) for one in self._of_each(values[None]))
-        return Told(sigma=sigma, share=share, share_alike=alike, seen=seen)
+        sigma, share, alike = (float(one[0]) for one in self._of_each(values[None]))
+        return Told(sigma=sigma, share=share, share_alike=alike)
 
     def predicted(self, values: np.ndarray, covariance: np.ndarray | None) -> Predicted:
         """Return what is predicted of an effect whose values are known as far as recordings go.
@@ -60,10 +58,10 @@ class TellingForms:
         sizes, axes = np.linalg.eigh(covariance)
         steps = axes * np.sqrt(np.clip(sizes, 0.0, None))
         drawn = values + random.standard_normal((_DRAWS, len(values))) @ steps.T
-        sigma, _, alike, seen = self._of_each(drawn)
+        sigma, _, alike = self._of_each(drawn)
         measured = np.abs(sigma + random.standard_normal(_DRAWS))
         low, high = np.quantile(measured, [0.025, 0.975])
-        beyond = Told.beyond_of(sigma, alike, seen)
+        beyond = Told.beyond_of(sigma, alike)
         return Predicted(interval=(float(low), float(high)), chance=float(np.mean(beyond > 0)))
 
     def _of_each(self, values: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -77,9 +75,6 @@ class TellingForms:
         left = np.where((left > least[:, None]) & (alone > 0)[:, None], left, 0.0)
         nearest = left.min(axis=1)
         alike = left[:, ~self.larger].min(axis=1, initial=np.inf)
-        larger = left[:, self.larger].min(axis=1, initial=np.inf)
         size = np.where(alone > 0, alone, 1.0)
         share_alike = np.where(alone > 0, np.minimum(alike / size, 1.0), 0.0)
-        # A diagnosis weighs rivals where the effect is missing: there it counts as noise itself.
-        seen = np.sqrt(larger / (1.0 + alone / max(self.rows, 1.0)))
-        return np.sqrt(nearest), nearest / size, share_alike, seen
+        return np.sqrt(nearest), nearest / size, share_alike

@@ -16,9 +16,6 @@ DECIDES = 6.5
 """Standard deviations that decide. The diagnosis compares the squared residuals that two effects
 leave: x standard deviations apart they differ by x^2, with a standard deviation of 2 x. Nine times
 in ten that is beyond 1.96 of these, the conventional level, where x / 2 > 1.96 + 1.28."""
-SEEN = 1.28 + float(np.hypot(1.28, DEFAULTS.search.told_apart))
-"""Of a rival with more parameters, where the effect counts as noise as long as it is missing: from
-here on x^2 is beyond the difference that a diagnosis asks for, nine times in ten."""
 ALIKE = DEFAULTS.search.alike
 """Share of what an effect explains up to which a diagnosis names what explains the rest with it,
 however many standard deviations that share is, unless it has more parameters."""
@@ -39,24 +36,30 @@ class Told:
     share : of what the effect explains beside the model, which the rival cannot.
     share_alike : the same of the nearest of those rivals that have no more parameters, or columns
         that a diagnosis takes at a first guess; 1 where there is none.
-    seen : standard deviations by which it is told from the nearest of the others, where the effect
-        is missing and counts as noise; infinite where there is none.
     """
 
     sigma: float
     share: float
     share_alike: float
-    seen: float
 
     @property
     def beyond(self) -> float:
         """By how much, of what a decision needs, that is exceeded; below zero it is not reached."""
-        return float(self.beyond_of(*np.array([self.sigma, self.share_alike, self.seen])))
+        return float(self.beyond_of(*np.array([self.sigma, self.share_alike])))
 
     @staticmethod
-    def beyond_of(sigma: np.ndarray, share_alike: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """`beyond` of many, (d,)."""
-        return np.minimum.reduce([sigma / DECIDES, share_alike / ALIKE, seen / SEEN]) - 1.0
+    def beyond_of(sigma: np.ndarray, share_alike: np.ndarray) -> np.ndarray:
+        """Return `beyond` of many.
+
+        Parameters
+        ----------
+        sigma, share_alike : (d,) as of one.
+
+        Returns
+        -------
+        (d,).
+        """
+        return np.minimum(sigma / DECIDES, share_alike / ALIKE) - 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,12 +165,7 @@ class Separation:
                 f"all but {percent(self.told.share_alike, 2)} of what it explains is imitated, and "
                 f"up to {percent(ALIKE, 1)} a diagnosis may name both"
             )
-        if self.told.sigma < DECIDES:
-            return "too little of it is beyond the noise"
-        return (
-            f"all but {percent(self.told.share, 2)} of what it explains is imitated, and where it "
-            "is missing a diagnosis counts it as noise"
-        )
+        return "too little of it is beyond the noise"
 
     def to_dict(self) -> dict[str, Any]:
         """The separation as JSON has it; what is infinite is null."""
