@@ -8,7 +8,8 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
-from dynident.diagnosis.details import named_together
+from dynident.diagnosis.details import Withdrawn, named_together
+from dynident.effects import effects_of
 from dynident.model import Model
 from dynident.recording import Dataset, Filter
 from synthetic import arm, synthetic, true_values
@@ -52,6 +53,18 @@ def test_what_raises_the_held_out_error_is_withdrawn_and_said_to_be() -> None:
     for step in said["steps"]:
         assert step["test_error_after"] <= step["test_error_before"]
     assert found.verdict != "explained"
+
+
+def test_what_cannot_be_told_from_something_withdrawn_is_said_with_it() -> None:
+    offset, spring = (
+        effects_of(f"{one}@elbow", arm())[0] for one in ("torque_offset", "joint_spring")
+    )
+    one = Withdrawn(effect=spring, why="raises the error", with_it=(offset,))
+    assert one.to_dict()["with_it"] == [
+        {"effect": "torque_offset", "joint": "elbow", "source": None}
+    ]
+    assert "Not tried in its place: torque offset at elbow, which is" in one.sentence
+    assert set(one.refusals) == {spring.label, offset.label}
 
 
 @pytest.mark.slow
