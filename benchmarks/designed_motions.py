@@ -27,11 +27,13 @@ import argparse
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.optimize import minimize
 
 import dynident as di
+from dynident.closed_loop import load_experiment, write_experiment
 from dynident.effects import effects_of
 from dynident.experiment_design import DesignTask, RecordingDesign
 from dynident.experiment_design.motion_program import FINER, MotionProgram
@@ -51,6 +53,15 @@ PAIRS = (
     ("rotor_inertia@J", "joint_coupling@J:K"),
     ("asymmetric_friction@J", "torque_offset@J"),
 )
+
+
+def study_of(name: str) -> di.Study:
+    """The study of a problem; where it has none, virtual measurements are made."""
+    if (PROBLEMS / name / "study.toml").exists():
+        return di.load(PROBLEMS / name / "study.toml")
+    with TemporaryDirectory() as folder:
+        write_experiment(load_experiment(PROBLEMS / name / "experiment.toml"), Path(folder))
+        return di.load(Path(folder) / "study.toml")
 
 
 def unrecorded(found: RecordingDesign, starts: int, seed: int) -> RecordingDesign:
@@ -146,7 +157,7 @@ def main() -> None:
     asked = parser.parse_args()
     rows, pairs, rivals = [], [], []
     for name in asked.arms:
-        study = di.load(PROBLEMS / name / "study.toml")
+        study = study_of(name)
         for seed in range(asked.seeds if asked.only != "pairs" else 0):
             task = DesignTask(repeat=1, harmonics=5, starts=asked.starts, seed=100 * seed)
             found = di.design(study.model, study.train, task, progress=lambda _: None)
