@@ -86,6 +86,9 @@ def ratios(found: RecordingDesign, count: int) -> tuple[float, float, float, flo
     return mean[0], mean[1], float(np.nanmax(each)), spent
 
 
+_STRUCTURAL = 1e-12  # of the largest singular value: what is less is zero for every motion
+
+
 @dataclass(frozen=True)
 class Rival:
     """The motion of the least condition number.
@@ -105,14 +108,19 @@ class Rival:
 
 
 def condition(program: MotionProgram, variables: np.ndarray) -> float:
-    """Condition number of the regressor of a motion within the limits; infinite for others."""
+    """Condition number of the regressor of a motion within the limits; infinite for others.
+
+    Of what any motion tells: columns of effects may be those of bodies, whatever the motion.
+    """
     t = program.motions.times(program.instants)
     inside = program.within(variables)
     if inside is None:
         return float("inf")
     asked = program.information
     rows = asked.columns.along(t, *program.motions.trajectory(inside).at(t)) @ asked.mix
-    return float(np.linalg.cond(rows.reshape(-1, rows.shape[2])))
+    sizes = np.linalg.svd(rows.reshape(-1, rows.shape[2]), compute_uv=False)
+    told = sizes[sizes > _STRUCTURAL * sizes[0]]
+    return float(told[0] / told[-1])
 
 
 def by_condition_number(found: RecordingDesign, count: int, evaluations: int) -> Rival:
