@@ -15,6 +15,7 @@ import numpy as np
 
 from dynident.effects import Effect, ShapeParameter
 from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.information import ROUNDING
 from dynident.experiment_design.telling.predictions import TellingForms
 from dynident.experiment_design.telling.separation import Told
 from dynident.model import Model
@@ -24,7 +25,6 @@ _MOST_SHAPES = 200  # of a rival
 _BETWEEN = 4  # shapes, from one of the grid to the next
 _AT_ONCE = 4000  # instants: columns of all shapes are large
 _UNSEEN = 1e-7  # of the largest column: it makes no torque
-_ROUNDING = 1e-11  # of a size: what is less is nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ class Imitations:
         size = np.sqrt(np.diag(shared)[:p])
         size = np.where(size > 0, size, 1.0)
         known, turn = np.linalg.eigh(shared[:p, :p] / np.outer(size, size))
-        kept = known > _ROUNDING * max(known[-1], 0.0) if len(known) else np.zeros(0, bool)
+        kept = known > ROUNDING * max(known[-1], 0.0) if len(known) else np.zeros(0, bool)
         # Whitened coordinates of what the model takes away from the others.
         cleared = (turn[:, kept] / np.sqrt(known[kept])).T / size
         of_effect, of_rivals = cleared @ shared[:p, p:], cleared @ cross[:p]
@@ -168,7 +168,7 @@ def _explained(own: np.ndarray, beside: np.ndarray, size: np.ndarray) -> np.ndar
     if not len(size):
         return np.zeros((len(beside), len(beside)))
     values, turn = np.linalg.eigh(own / np.outer(size, size))
-    seen = values > _ROUNDING
+    seen = values > ROUNDING
     along = (beside / size) @ turn[:, seen] / np.sqrt(values[seen])
     return along @ along.T
 

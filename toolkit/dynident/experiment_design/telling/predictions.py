@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.experiment_design.information import ROUNDING
 from dynident.experiment_design.telling.separation import Predicted, Told
 
 _DRAWS = 1000
 _SEED = 0
-_ROUNDING = 1e-11  # of a size: what is less is nothing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,7 +69,7 @@ class TellingForms:
         whole, alone = (
             np.einsum("di,ij,dj->d", values, m, values) for m in (self.whole, self.alone)
         )
-        least = _ROUNDING * whole
+        least = ROUNDING * whole
         alone = np.where(alone > least, alone, 0.0)
         left = np.einsum("di,rij,dj->dr", values, self.left, values)
         left = np.where((left > least[:, None]) & (alone > 0)[:, None], left, 0.0)
