@@ -43,6 +43,8 @@ def test_study_files(run, tmp_path):
     refused(run, tmp_path, r"null.toml: is not TOML", "explain", "null.toml")
     refused(run, tmp_path, r"no/study.toml: no such file", "add", "no/study.toml", "joint_spring")
     refused(run, tmp_path, r"none.toml: no such file", "simulate", "none.toml", "--out", "x")
+    meant = r"binry.toml: no such file. did you mean 'binary.toml'\?"
+    refused(run, tmp_path, meant, "explain", "binry.toml")
 
 
 # --- recordings ---------------------------------------------------------------------------------

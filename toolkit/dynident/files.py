@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
 import stat
 import tempfile
@@ -13,10 +14,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dynident.errors import FileError
+from dynident.words import close_word
 
 LARGEST_DOCUMENT = 1 << 26
 """Bytes of a robot description, a study or an estimate; formats of data have other limits."""
 _BLOCK = 1 << 20
+_LOOKED_AT = 1000
+"""Names in a folder among which the one that was meant is sought."""
 
 
 @contextmanager
@@ -34,7 +38,7 @@ def open_regular(path: str | Path) -> Iterator[BinaryIO]:
         # Without O_NONBLOCK, opening a pipe waits until somebody opens its other end.
         number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
-        raise FileError("no such file", str(path), "check the path") from None
+        raise FileError("no such file", str(path), _remedy(path)) from None
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
     except ValueError:
@@ -48,6 +52,17 @@ def open_regular(path: str | Path) -> Iterator[BinaryIO]:
         raise FileError(what, str(path), "write its content to a file first")
     with open(number, "rb") as stream:
         yield stream
+
+
+def _remedy(path: Path) -> str:
+    """Which file of the same folder may have been meant instead of one that is not there."""
+    try:
+        with os.scandir(path.parent) as entries:
+            names = [one.name for one in itertools.islice(entries, _LOOKED_AT)]
+    except OSError:
+        return "check the path"
+    meant = close_word(path.name, names, 0.8)
+    return f"did you mean {meant!r}?" if meant else "check the path"
 
 
 def read_bytes(
