@@ -94,7 +94,8 @@ def load_laws(folder: Path) -> list[JudgedLaws]:
     for line in path.read_text().splitlines() if path.exists() else ():
         said = json.loads(line)
         if "skipped" not in said:
-            truth = json.loads((folder / "truth" / f"{said['name']}.json").read_text())
+            case = said.get("case", said["name"])  # a case may be asked with several filters
+            truth = json.loads((folder / "truth" / f"{case}.json").read_text())
             found[said["name"]] = judge_laws(truth, said)
     return [found[name] for name in sorted(found)]
 
