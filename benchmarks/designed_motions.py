@@ -2,8 +2,8 @@
 
     python benchmarks/designed_motions.py --random 1000 --starts 2
 
-For arms of two, six and seven joints: the geometric mean of the standard deviations of all
-parameters with the designed motion over that with the best, and with the median, of many random
+For arms of two, ten and seven joints, or the problems that `--arms` names: the geometric mean of
+the standard deviations of all parameters with the designed motion over that with the best, and with the median, of many random
 motions (Fourier series of the same period and harmonics, each as large as the limits allow), as if
 nothing had been recorded, and with what the recordings of the study tell, which hides much; the
 worst of these ratios; and processor time. Then pairs of effects: phi, the squared distance in
