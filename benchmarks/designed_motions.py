@@ -3,15 +3,15 @@
     python benchmarks/designed_motions.py --random 1000 --starts 2
 
 For arms of two, ten and seven joints, or the problems that `--arms` names: the geometric mean of
-the standard deviations of all parameters with the designed motion over that with the best, and with the median, of many random
-motions (Fourier series of the same period and harmonics, each as large as the limits allow), as if
-nothing had been recorded, and with what the recordings of the study tell, which hides much; the
-worst of these ratios; and processor time. Then pairs of effects: phi, the squared distance in
-standard deviations, with the recordings so far, over that with the best of 200 random motions; what
-the motion adds to the phi of these recordings over what the best random motion adds; phi of a
-motion that is designed as if nothing had been recorded, over that with the best of 200; and the
-length of usual motion that a design of 10 s is worth. With `--starts 20` it is seen whether a
-search from more places finds more.
+the standard deviations of all parameters with the designed motion over that with the best, and with
+the median, of many random motions (Fourier series of the same period and harmonics, each as large
+as the limits allow), as if nothing had been recorded, and with what the recordings of the study
+tell, which hides much; the worst of these ratios; and processor time. Then pairs of effects: phi,
+the squared distance in standard deviations, with the recordings so far, over that with the best of
+200 random motions; what the motion adds to the phi of these recordings over what the best random
+motion adds; phi of a motion that is designed as if nothing had been recorded, over that with the
+best of 200; and the length of usual motion that a design of 10 s is worth. With `--starts 20` it is
+seen whether a search from more places finds more.
 
 Other tools minimise the condition number of the base regressor, without gradients (S. Bethge,
 J. Malzahn, N. Tsagarakis and D. Caldwell, "FloBaRoID - a software package for the identification of
