@@ -105,6 +105,11 @@ class _Call:
             scope |= vars(sys.modules[home.__module__])
         return typing.get_type_hints(self._function, localns=scope)
 
+    @cached_property
+    def _words(self) -> dict[str, tuple[Any, ...]]:
+        """Words that are admitted, by the name of the argument, of those that want words."""
+        return {name: words for name, hint in self._hints.items() if (words := _words(hint))}
+
     def check(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
         """Refuse arguments of a wrong kind; return them by their names."""
         try:
@@ -122,9 +127,9 @@ class _Call:
 
     def check_words(self, given: dict[str, Any]) -> None:
         """Refuse words that are not among those of their annotation."""
-        for name, value in given.items():
-            words = _words(self._hints.get(name, Any))
-            if words and isinstance(value, str) and value not in words:
+        for name, words in self._words.items():
+            value = given.get(name)
+            if isinstance(value, str) and value not in words:
                 remedy = f"give {_wanted(self._hints[name])}"
                 raise ArgumentError(f"{name} {_shown(value)}", self._name, remedy)
 

@@ -15,7 +15,7 @@ from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.expected_bias import held
-from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
+from dynident.fitting.uncertainty.input_bias import input_bias
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, scattered, widened
 from dynident.fitting.uncertainty.lagged_rows import factors_with_columns, lagged_columns
 from dynident.fitting.uncertainty.row_errors import row_errors
@@ -65,6 +65,16 @@ class LeastSquares:
         FitError
             If there are fewer equations than parameters, or the torque is zero throughout.
         """
+        estimate, solution = self.without_bias(model, dataset)
+        return estimate if self.errors == "independent" else with_bias(estimate, dataset, solution)
+
+    def without_bias(self, model: Model, dataset: Dataset) -> tuple[Estimate, LinearSolution]:
+        """As `fit`, before the bias that noise of the positions leaves is in sigma.
+
+        Returns
+        -------
+        The estimate, and the solution that it is of.
+        """
         if not dataset.recordings:
             raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
         columns = None
@@ -78,7 +88,7 @@ class LeastSquares:
             model, factors, solution = self._iterate(model, dataset, solution.values)
         estimate = estimate_of(self.name, self.weighting, model, dataset, factors, solution)
         if self.errors == "independent":
-            return estimate
+            return estimate, solution
         found = row_errors(model, dataset, solution.values, solution, columns)
         covariance, words, headline = found.covariance, found.words, ""
         judged = lack_of_fit(model, dataset, solution.values)
@@ -91,8 +101,7 @@ class LeastSquares:
         whole = np.zeros_like(solution.covariance)
         whole[np.ix_(kept, kept)] = covariance
         estimate = replace(estimate, covariance=whole, sigma_words=words, headline=headline)
-        bias = input_bias(model, dataset, solution.values, solution, estimate.sigma)
-        return estimate if bias is None else _with_bias(estimate, bias)
+        return estimate, solution
 
     def _iterate(
         self, model: Model, dataset: Dataset, values: np.ndarray
@@ -126,8 +135,21 @@ def _factors_of(
     return factorise(sample(recording, settings).rows(model, values))
 
 
-def _with_bias(estimate: Estimate, bias: InputBias) -> Estimate:
-    """Return an estimate whose sigma holds a bias, and that says so."""
+def with_bias(estimate: Estimate, dataset: Dataset, solution: LinearSolution) -> Estimate:
+    """Return an estimate whose sigma holds the bias that noise of the positions leaves.
+
+    Parameters
+    ----------
+    estimate, solution : of `LeastSquares.without_bias`.
+    dataset : what was fitted.
+
+    Returns
+    -------
+    The same where the recordings are too short to tell.
+    """
+    bias = input_bias(estimate.model, dataset, solution.values, solution, estimate.sigma)
+    if bias is None:
+        return estimate
     notes = (*estimate.notes, bias.note) if bias.note else estimate.notes
     return replace(
         estimate,

@@ -43,8 +43,8 @@ def central_difference(x: np.ndarray, rate_hz: float, order: int = 2) -> np.ndar
     correlate1d(x, rate_hz * _difference_weights(half), axis=0, output=found, mode="nearest")
     for k in range(1, min(half, (rows + 1) // 2)):
         weights = rate_hz * _difference_weights(k)
-        found[k] = np.tensordot(weights, x[: 2 * k + 1], 1)
-        found[-1 - k] = np.tensordot(weights, x[rows - 2 * k - 1 :], 1)
+        found[k] = _weighted(weights, x[: 2 * k + 1])
+        found[-1 - k] = _weighted(weights, x[rows - 2 * k - 1 :])
     found[0], found[-1] = (x[1] - x[0]) * rate_hz, (x[-1] - x[-2]) * rate_hz
     return found
 
@@ -77,8 +77,8 @@ def held_torque(command: np.ndarray, order: int = 2) -> np.ndarray:
     found = np.empty(command.shape)
     correlate1d(command, _held_weights(half), axis=0, output=found, mode="nearest")
     for k in range(1, min(half, (rows + 1) // 2)):
-        found[k] = np.tensordot(_held_weights(k), command[: 2 * k], 1)
-        found[-k] = np.tensordot(_held_weights(k), command[rows - 2 * k :], 1)
+        found[k] = _weighted(_held_weights(k), command[: 2 * k])
+        found[-k] = _weighted(_held_weights(k), command[rows - 2 * k :])
     found[0] = command[0]
     return found
 
@@ -106,6 +106,11 @@ def held_gain(angle: np.ndarray, order: int) -> np.ndarray:
     half = order // 2
     steps = np.arange(half) + 0.5
     return 2.0 * np.cos(np.multiply.outer(angle, steps)) @ _held_weights(half)[half:]
+
+
+def _weighted(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Weighted sum over axis 0, as `np.tensordot`, which of few rows is mostly overhead."""
+    return np.dot(weights[None], x.reshape(len(x), -1)).reshape(x.shape[1:])
 
 
 @lru_cache

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import ceil
 
 import numpy as np
@@ -45,6 +45,9 @@ _JUMP = 0.5
 noise counts more, which is in every row."""
 _HIDES = 0.7
 """Times the cut-off that suits recordings, below which a filter hides motion that it need not."""
+_EVERY = 1, 2, 4
+"""Samples that noise lasts: what a drive has filtered before it was recorded is seen in every
+k-th alone, and has that much less of the band that differences magnify."""
 _ALIKE = 1.05  # largest over smallest of the rates that recordings are decimated to
 _PARTS, _LENGTH = 16, 4096
 """Parts of a recording that are looked at, spread over it, and samples of each at most."""
@@ -245,12 +248,17 @@ def _errors(q: np.ndarray, rate_hz: float, cutoffs: Sequence[float]) -> np.ndarr
     # samples: the largest noise that is seen at any rate at which a motion is still smooth.
     slowest = max(1, int(rate_hz / (_NOISE_RATE * cutoffs[0])))
     noise = _noise(q, [2**k for k in range(slowest.bit_length())])
-    gains = [SpeedGain(rate_hz, Filter(position_cutoff_hz=one)) for one in cutoffs]
+    gains = [_speed_gain(rate_hz, one) for one in cutoffs]
     moves = np.ptp(q, axis=0) > _MOVES * noise
     v = central_difference(lowpass(q, rate_hz, cutoffs[0]), rate_hz)
     jump = _JUMP * np.sqrt(np.mean(central_difference(v, rate_hz) ** 2, axis=0))
     squares = [(noise * one.noise) ** 2 + (jump * one.rounding) ** 2 for one in gains]
     return np.sum(np.log(np.array(squares)[:, moves]), axis=1)
+
+
+@lru_cache(16)
+def _speed_gain(rate_hz: float, cutoff_hz: float) -> SpeedGain:
+    return SpeedGain(rate_hz, Filter(position_cutoff_hz=cutoff_hz))
 
 
 def _order_errors(
@@ -269,18 +277,11 @@ def _order_errors(
     What they fall short, relative, and the variance of their noise over the mean square of the
     motion's.
     """
-    # What a drive has filtered before it was recorded is seen in every k-th sample alone, and has
-    # that much less of the band that differences magnify.
-    every = (1, 2, 4)
-    noise = np.array([_noise(q, (k,)) for k in every])
+    noise = np.array([_noise(q, (k,)) for k in _EVERY])
     # Half the usual one leaves a thirtieth of what noise adds to the motion's accelerations.
     low = default_position_cutoff(rate_hz, cutoff_hz) / 2.0
     smooth = lowpass(q, rate_hz, low)
     moves = np.ptp(q, axis=0) > _MOVES * noise[0]
-    passed = np.ones_like(_TURN)
-    if cutoff_hz and cutoff_hz < rate_hz / 2:
-        passed = np.abs(response(butterworth(rate_hz, cutoff_hz), _TURN)) ** 2
-
     around = max(ORDERS[-1], ceil(rate_hz / low))  # what the low-pass makes up
 
     def twice(order: int) -> np.ndarray:
@@ -289,12 +290,25 @@ def _order_errors(
 
     best, short, noisy = twice(ORDERS[-1]), [], []
     size = np.mean(best**2, axis=0)
-    for order in ORDERS:
-        gain = (rate_hz**2 * difference_gain(_TURN, order) ** 2 * passed) ** 2
-        within = [k * np.trapezoid(np.where(k * _TURN <= np.pi, gain, 0.0), _TURN) for k in every]
-        noisy.append(np.max(noise**2 * np.array(within)[:, None] / np.pi, axis=0))
+    for order, within in zip(ORDERS, _passed_noise(rate_hz, cutoff_hz), strict=True):
+        noisy.append(np.max(noise**2 * within[:, None] / np.pi, axis=0))
         short.append(np.abs(np.mean((twice(order) - best) * best, axis=0)))
     return np.array(short)[:, moves] / size[moves], np.array(noisy)[:, moves] / size[moves]
+
+
+@lru_cache(64)
+def _passed_noise(rate_hz: float, cutoff_hz: float | None) -> np.ndarray:
+    """What differences of each order and a low-pass leave of noise that holds so many samples."""
+    passed = np.ones_like(_TURN)
+    if cutoff_hz and cutoff_hz < rate_hz / 2:
+        passed = np.abs(response(butterworth(rate_hz, cutoff_hz), _TURN)) ** 2
+    found = []
+    for order in ORDERS:
+        gain = (rate_hz**2 * difference_gain(_TURN, order) ** 2 * passed) ** 2
+        found.append(
+            [k * np.trapezoid(np.where(k * _TURN <= np.pi, gain, 0.0), _TURN) for k in _EVERY]
+        )
+    return np.array(found)
 
 
 def _noise(q: np.ndarray, every: Sequence[int]) -> np.ndarray:

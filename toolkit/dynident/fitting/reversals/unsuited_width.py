@@ -15,7 +15,7 @@ import numpy as np
 
 from dynident.errors import FitError, RecordingError
 from dynident.fitting.estimate import Estimate
-from dynident.fitting.least_squares import LeastSquares
+from dynident.fitting.least_squares import LeastSquares, with_bias
 from dynident.fitting.uncertainty.shape_slopes import WidthSecant, WidthSlope, width_slope
 from dynident.model import coulomb_levels, dry_joints
 from dynident.recording import Dataset
@@ -99,13 +99,17 @@ def _unsuited_by(
     """Joints whose width does not suit by a derivative, or a secant, as a column more of each.
 
     Rows that hang together cost most of a fit. It is spared where sigma of rows that do not, from
-    the same values, is so large that theirs could not be small enough.
+    the same values, is so large that theirs could not be small enough; and so is the bias, which
+    makes sigma larger, where it is too large without.
     """
     wider = replace(given.model, effects=(*given.model.effects, *columns))
     textbook = replace(method, errors="independent").fit(wider, dataset)
     if not _unsuited(given, textbook, columns, _CLEARLY / _SMALLER):
         return []
-    return _unsuited(given, method.fit(wider, dataset), columns, _CLEARLY)
+    wide, solution = method.without_bias(wider, dataset)
+    if not _unsuited(given, wide, columns, _CLEARLY):
+        return []
+    return _unsuited(given, with_bias(wide, dataset, solution), columns, _CLEARLY)
 
 
 def _unsuited(
