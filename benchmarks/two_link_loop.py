@@ -104,7 +104,7 @@ class Lab:
             Recording(
                 t,
                 q[i],
-                tau[i] + std * torque_noise(rng, tau[i].shape, self.colour_s),
+                tau[i] + std * torque_noise(rng, tau[i].shape, self.colour_s, self.rate_hz),
                 ("shoulder", "elbow"),
                 q_ref=q_ref[i],
                 torque="held_command",
@@ -188,12 +188,14 @@ def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
     return casadi.vertcat(v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det)
 
 
-def torque_noise(rng: np.random.Generator, shape: tuple[int, ...], colour_s: float) -> np.ndarray:
+def torque_noise(
+    rng: np.random.Generator, shape: tuple[int, ...], colour_s: float, rate_hz: float = RATE
+) -> np.ndarray:
     """Noise of unit variance, (T, n), that forgets itself over a time (s); white if that is 0."""
     white = rng.normal(size=shape)
     if not colour_s:
         return white
-    kept = np.exp(-1.0 / (RATE * colour_s))
+    kept = np.exp(-1.0 / (rate_hz * colour_s))
     return np.asarray(scipy.signal.lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], white, axis=0))
 
 
