@@ -204,9 +204,14 @@ def controller() -> Controller:
     return Controller(kind="pd", rate_hz=RATE, kp=tuple(KP), kd=tuple(KD))
 
 
+@cache
+def _robot() -> Robot:
+    return Robot.from_text(ARM)
+
+
 def model(width: float = WIDTH) -> Model:
     """The arm with viscous friction, and dry friction that reverses over so many rad/s."""
-    bodies = Model(Robot.from_text(ARM), friction_width=width)
+    bodies = Model(_robot(), friction_width=width)
     return bodies + "viscous_friction" + "coulomb_friction"
 
 

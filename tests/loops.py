@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, Sensors, TrueEffect
@@ -28,7 +30,9 @@ FREQUENCY_HZ = (2.0, 6.0)
 VISCOUS, COULOMB = (0.5, 0.1), (0.8, 0.15)
 
 
+@cache
 def robot() -> Robot:
+    """One for all: what is worked out of its description is kept with it."""
     return Robot.from_text(ARM)
 
 
