@@ -12,13 +12,14 @@ from dynident.tables import number
 from synthetic import synthetic, true_values
 from torso import WAIST
 
+TORSO = Robot.from_text(WAIST)
 TILT = np.array([0.04, 0.03])
 GRANTED = "takes for granted that there is no unbalance at waist"
 
 
 def tilted(seed: int, moment: float = 0.03) -> Dataset:
     """A torso on a tilt, whose description is off by so many kg m beside its axis."""
-    true = Model(Robot.from_text(WAIST)) + "base_tilt" + "unbalance@waist"
+    true = Model(TORSO) + "base_tilt" + "unbalance@waist"
     values = true_values(true)
     values[true.slices["base_tilt"]] = TILT
     values[true.slices["unbalance@waist"]] = 9.81 * moment * np.array([TILT[1], -TILT[0]])
@@ -31,11 +32,11 @@ def off(found: Estimate) -> np.ndarray:
 
 
 def test_sigma_says_what_it_takes_for_granted_and_what_it_would_be_else() -> None:
-    given = Model(Robot.from_text(WAIST)) + "base_tilt"
+    given = Model(TORSO) + "base_tilt"
     granted, known = [], []
     for seed in range(12):
-        narrow = fit(given, tilted(seed))
-        wide = fit(given + "unbalance@waist", tilted(seed))
+        data = tilted(seed)
+        narrow, wide = fit(given, data), fit(given + "unbalance@waist", data)
         own = narrow.model.slices["base_tilt"]
         granted.append(off(narrow) / narrow.sigma[own])
         known.append(off(wide) / wide.sigma[own])
@@ -50,7 +51,7 @@ def test_sigma_says_what_it_takes_for_granted_and_what_it_would_be_else() -> Non
 
 
 def test_nothing_is_said_without_a_tilt_and_a_table_s_rows_stay_independent() -> None:
-    given = Model(Robot.from_text(WAIST))
+    given = Model(TORSO)
     assert GRANTED not in fit(given, tilted(0)).words_of_sigma
     plain = fit(given + "base_tilt", tilted(0), LeastSquares(errors="independent"))
     assert GRANTED in plain.words_of_sigma and plain.takes_rows_as_independent

@@ -50,13 +50,15 @@ class BaseTilt(Forceless):
         rx, ry = self.point or (0.0, 0.0)
         first, second = _sine_and_cosine(float(np.hypot(rx, ry)))
         r = np.array([rx, ry, 0.0])
-        still = np.zeros_like(block.q)
-        columns = np.empty((*block.q.shape, 2))
-        for k, axis in enumerate(np.eye(3)[:2]):
-            turned = np.cross(axis, body.gravity)
-            change = -first * turned + second * np.cross(r, turned)
-            # What a robot at rest takes is linear in gravity.
-            columns[:, :, k] = body.with_gravity(change).inverse_dynamics(block.q, still, still)
+        turned = np.cross(np.eye(3)[:2], body.gravity)
+        change = -first * turned + second * np.cross(r, turned)
+        still, columns = np.zeros_like(block.q), np.zeros((*block.q.shape, 2))
+        # What a robot at rest takes is linear in gravity. For every other direction of it, as in
+        # each round of a fit, a function of many samples would be made anew; these three are kept.
+        for axis, parts in zip(np.eye(3), change.T, strict=True):
+            if parts.any():
+                torque = body.with_gravity(axis).inverse_dynamics(block.q, still, still)
+                columns += parts * torque[:, :, None]
         return columns
 
     def simulated_robot(self, values, robot):
