@@ -84,6 +84,7 @@ class DesignQuestion:
         task: DesignTask,
         motions: MotionFamily,
         told: Sequence[Effect] = (),
+        estimates: dict[tuple[Effect, ...], Estimate] | None = None,
     ) -> DesignQuestion:
         """Fit what was recorded.
 
@@ -94,6 +95,8 @@ class DesignQuestion:
         task : what for.
         motions : among which one is sought.
         told : one of its groups of effects.
+        estimates : of the same recordings, by their effects: what is missing is fitted and joins
+            them, so that tasks that differ in their loads have one fit.
 
         Returns
         -------
@@ -106,7 +109,10 @@ class DesignQuestion:
         bare = model
         for one in (*told, *shown):
             bare = bare - one.label if one in bare else bare
-        estimate = fit(bare + told[:1] if told else bare, recorded)
+        estimates, whole = {} if estimates is None else estimates, bare + told[:1] if told else bare
+        estimate = estimates.get(whole.effects)
+        if estimate is None:
+            estimate = estimates[whole.effects] = fit(whole, recorded)
         fitted = {one.label: one for one in estimate.model.effects}
         torque = _torque(estimate, recorded, motions)
         if task.load:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.arguments import checked
+from dynident.effects import Effect
 from dynident.errors import DesignError
 from dynident.experiment_design.design_question import Asked, DesignQuestion
 from dynident.experiment_design.design_task import DesignTask
@@ -75,15 +76,17 @@ def design(
     limits.require_ranges(model.robot)
     recorded = Dataset.of(recorded, model.robot.names)
     loads = tuple(dict.fromkeys(task.loads))
+    estimates: dict[tuple[Effect, ...], Estimate] = {}
     if len(loads) < 2:
-        return _designed(model, recorded, task, limits, progress)
+        return _designed(model, recorded, task, limits, progress, estimates)
     found: list[RecordingDesign] = []
     tried: list[LoadTried] = []
     refused: list[DesignError] = []
     for load in loads:
         progress(f"with {load:g} kg on the last link")
+        with_load = replace(task, loads=(load,))
         try:
-            one = _designed(model, recorded, replace(task, loads=(load,)), limits, progress)
+            one = _designed(model, recorded, with_load, limits, progress, estimates)
         except DesignError as error:  # a load may be too heavy
             tried.append(LoadTried(mass=load, why=str(error)))
             refused.append(error)
@@ -102,18 +105,21 @@ def _designed(
     task: DesignTask,
     limits: MotionLimits,
     progress: Callable[[str], None],
+    estimates: dict[tuple[Effect, ...], Estimate],
 ) -> RecordingDesign:
     """The design with one load, or with none.
 
     Parameters
     ----------
     model, recorded, task, limits, progress : as for `design`; of the loads, the first.
+    estimates : as for `DesignQuestion.of`.
     """
     workspace = _workspace(model.robot, task, limits)
     motions = _motions(task, limits)
     progress("fitting what was recorded")
     questions = [
-        DesignQuestion.of(model, recorded, task, motions, told) for told in task.tell or ((),)
+        DesignQuestion.of(model, recorded, task, motions, told, estimates)
+        for told in task.tell or ((),)
     ]
     progress("writing the columns out")
     asked = [one.asked(recorded, motions) for one in questions]
