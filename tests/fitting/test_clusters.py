@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fleets
 from dynident import Dataset, Estimate, Model, Recording, fit
 from dynident.clusters import over_recordings, spread, working_on
 from dynident.errors import FitError, RecordingError
-from dynident.fitting import Constrained, LeastSquares
+from dynident.fitting import Constrained, LeastSquares, fit_fleet
 from synthetic import arm, synthetic, true_values
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
@@ -157,6 +158,19 @@ def test_a_cluster_that_fails_is_one_line(runs, monkeypatch, method) -> None:
     monkeypatch.setattr(cluster, method, fail)
     with pytest.raises(FitError, match=r"the cluster failed \(CancelledError: lost it all\)"):
         fit(model_of(MODELS["complete"]), Dataset(runs), client=cluster)
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.slow
+def test_a_fleet_is_fitted_there_all_the_same(client) -> None:
+    even, there = (fit_fleet(fleets.model(), fleets.robots(), client=one) for one in (None, client))
+    for name, one in even.estimates.items():
+        other: Estimate = there.estimates[name]
+        np.testing.assert_allclose(other.values, one.values, rtol=1e-10)
+        np.testing.assert_allclose(other.covariance, one.covariance, rtol=1e-10, atol=1e-14)
+    assert [one.robot for one in there.comparisons] == [one.robot for one in even.comparisons]
+    with pytest.raises(FitError, match="robot 'bob': no recording"):
+        fit_fleet(fleets.model(), {**fleets.robots(), "bob": Dataset(())}, client=client)
 
 
 @pytest.mark.filterwarnings("default")

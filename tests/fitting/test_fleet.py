@@ -7,40 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from dynident import Dataset, Estimate, Model, Recording, fit
+from dynident import Dataset, Model, fit
 from dynident.errors import FitError
 from dynident.fitting import Fleet, fit_fleet
 from dynident.fitting.comparing.between_robots import against_others, holm, usual_value
+from fleets import NAMES, model, robots
 from synthetic import arm, synthetic, true_values
-
-NAMES = ("ada", "bob", "cleo", "dan", "eve", "fay")
-FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
-
-
-def model() -> Model:
-    return Model(arm()) + "viscous_friction" + "coulomb_friction"
-
-
-def robots(**odd: float) -> dict[str, Recording]:
-    """Recordings of robots that spread by nature: inertias by 1 %, frictions by 5 %.
-
-    Parameters
-    ----------
-    odd : factors of parameters of cleo.
-    """
-    kind, rng = model(), np.random.default_rng(1)
-    truth = true_values(kind, **FRICTION)
-    relative = np.array([0.05 if name.startswith("F") else 0.01 for name in kind.names])
-    found = {}
-    for number, name in enumerate(NAMES):
-        values = truth * (1.0 + relative * rng.standard_normal(len(truth)))
-        for parameter, factor in odd.items() if name == "cleo" else ():
-            index = kind.names.index(parameter.replace("__", "@"))
-            values[index] = factor * truth[index]
-        found[name] = synthetic(
-            kind, values, number, rate_hz=250.0, duration=8.0, position_std=1e-5, torque_std=0.2
-        )
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -150,16 +122,3 @@ def test_bad_fleets_are_one_line() -> None:
         fit_fleet(model(), {name: data[name] for name in NAMES[:2]})
     with pytest.raises(FitError, match=r"robot 'bob': .*no recording"):
         fit_fleet(model(), {**data, "bob": Dataset(())})
-
-
-@pytest.mark.filterwarnings("default")
-@pytest.mark.slow
-def test_a_cluster_of_two_processes_says_the_same(client, even: Fleet) -> None:
-    there = fit_fleet(model(), robots(), client=client)
-    for name, one in even.estimates.items():
-        other: Estimate = there.estimates[name]
-        np.testing.assert_allclose(other.values, one.values, rtol=1e-10)
-        np.testing.assert_allclose(other.covariance, one.covariance, rtol=1e-10, atol=1e-14)
-    assert [one.robot for one in there.comparisons] == [one.robot for one in even.comparisons]
-    with pytest.raises(FitError, match="robot 'bob': no recording"):
-        fit_fleet(model(), {**robots(), "bob": Dataset(())}, client=client)

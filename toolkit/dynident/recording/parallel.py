@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -151,10 +152,17 @@ class ParallelFilter:
         samples : T.
         some : of the kept rows; all by default.
         """
+        count = self.count(samples)
+        return self._sample(samples, count - 1 - np.arange(*some.indices(count)))
+
+    def row(self, samples: int, which: int) -> int:
+        """Return which of so many samples is a kept row of a number, as `rows` of all has it."""
+        return self._sample(samples, self.count(samples) - 1 - which)
+
+    def _sample(self, samples: int, back: Any) -> Any:
+        """The sample that is a kept row so far back from the last, one or an array of them."""
         # In whole numbers: rounding must fall alike in every period.
         above, below = self._ratio
-        count = self.count(samples)
-        back = count - 1 - np.arange(*some.indices(count))
         return samples - 1 - (2 * above * back + below) // (2 * below)
 
     def times(self, t: np.ndarray) -> np.ndarray:

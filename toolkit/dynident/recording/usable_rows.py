@@ -138,7 +138,7 @@ class _RowTimes:
         return bisect_right(range(self.count), limit, key=self._at)
 
     def _at(self, row: int) -> float:
-        return float(self._t[self._parallel.rows(len(self._t), slice(row, row + 1))[0]])
+        return float(self._t[self._parallel.row(len(self._t), row)])
 
 
 @dataclass(frozen=True, kw_only=True)
