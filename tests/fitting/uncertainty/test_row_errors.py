@@ -105,16 +105,18 @@ def test_scaling_torques_scales_sigma(model: Model) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "case",
-    [{"seconds": 5.0}, {"colour_s": 0.05, "rate_hz": 500.0}],
+    "there",
+    [
+        lab.Lab(torque_std=STD, seconds=5.0),
+        lab.Lab(torque_std=STD, colour_s=0.05, rate_hz=500.0),
+    ],
     ids=["short records", "slow noise"],
 )
 def test_intervals_cover_where_the_noise_of_the_motions_band_is_hard_to_know(
-    case: dict[str, float],
+    there: lab.Lab,
 ) -> None:
     """Of 100 recordings of a foreign simulator; with even bands the slow noise has 0.86."""
     model = lab.model()
-    there = lab.Lab(torque_std=STD, **case)
     found = [fit(model, one) for one in there.recordings(range(7200, 7300))]
     assert 0.93 <= covered(found, lab.truth(model)) <= 0.97
 
