@@ -15,10 +15,13 @@ from dynident.wiring import check_wiring
 from wiring_faults import broken, column_faults
 
 ROOT = Path(__file__).parents[2]
+DIAGNOSED = {"panda", "staubli_tx40"}
+"""Of these `tests/problems` diagnoses the very study, and no fault is an answer there, too."""
 STUDIES = sorted(
     path
     for path in (ROOT / "problems").glob("*/*.toml")
     if path.name.startswith("study") and "[[recordings]]" in path.read_text()
+    if path.parent.name not in DIAGNOSED
 )
 FEW = {"torque_sign", "torque_signs", "torques_exchanged", "joints_exchanged", "degrees"}
 
@@ -45,7 +48,7 @@ def test_healthy_studies_are_left_alone(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "every"), [("double_pendulum", 1), ("emps", 1), ("panda", 4)])
+@pytest.mark.parametrize(("name", "every"), [("double_pendulum", 1), ("emps", 1), ("panda", 11)])
 def test_faults_in_measured_records_are_named(name: str, every: int) -> None:
     given = study(ROOT / "problems" / name / "study.toml")
     names, named, total = given.robot.names, 0, 0
