@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from dynident.cli import main
+from dynident.cli import main, studies, work
+from dynident.diagnosis import Diagnosis
 from study_files import STUDY, write_study
 
 
@@ -52,6 +53,19 @@ def run(capfd, tmp_path, monkeypatch) -> Run:
         return Done(int(stop.value.code or 0), said.out, said.err)
 
     return call
+
+
+@pytest.fixture
+def sought(monkeypatch) -> list[Diagnosis]:
+    """The diagnoses that the commands of a test make, the latest last."""
+    found: list[Diagnosis] = []
+
+    def diagnosed(*asked: Any, **more: Any) -> Diagnosis:
+        found.append(work.diagnosis_of(*asked, **more))
+        return found[-1]
+
+    monkeypatch.setattr(studies, "diagnosis_of", diagnosed)
+    return found
 
 
 @pytest.fixture

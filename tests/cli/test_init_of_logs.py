@@ -44,24 +44,24 @@ def test_loads_are_said_on_the_command_line(run, logs: Path) -> None:
     assert json.loads(done.out)["out"] == "new.toml"
 
 
-def seven_joints(seed: int) -> Recording:
-    """Two periods of a seven-joint arm with more friction at low speed in one joint."""
-    model = di.Model(di.Robot.from_text(chain_text(7, 2)))
+def four_joints(seed: int) -> Recording:
+    """Two periods of a four-joint arm with more friction at low speed in one joint."""
+    model = di.Model(di.Robot.from_text(chain_text(4, 2)))
     for name in ("viscous_friction", "coulomb_friction", "stribeck_friction@j3"):
         model = model + name
     values = model.given_values()
-    values[model.base.rank :] = [*(7 * [0.4]), *(7 * [0.3]), 0.8]
-    t, q, v, a = smooth_motion(7, seed, 100.0, 16.0, 8.0, 0.5)
+    values[model.base.rank :] = [*(4 * [0.4]), *(4 * [0.3]), 0.8]
+    t, q, v, a = smooth_motion(4, seed, 100.0, 16.0, 8.0, 0.5)
     tau = model.torque(model.block(t, q, v, a), values)
     tau = tau + 0.02 * np.random.default_rng(seed).normal(size=tau.shape)
     return Recording(t, q, tau, model.robot.names, v=v)
 
 
 @pytest.mark.slow
-def test_seven_joints_in_bags_are_explained_as_by_hand(run, tmp_path: Path) -> None:
+def test_four_joints_in_bags_are_explained_as_by_hand(run, tmp_path: Path) -> None:
     """`init`, then `explain`, with nothing edited between them."""
-    (tmp_path / "arm.urdf").write_text(chain_text(7, 2))
-    recordings = [seven_joints(1), seven_joints(2)]
+    (tmp_path / "arm.urdf").write_text(chain_text(4, 2))
+    recordings = [four_joints(1), four_joints(2)]
     drafts = {}
     for kind in KINDS:
         files = []

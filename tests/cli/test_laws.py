@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from dynident.cli import studies
 from dynident.closed_loop import load_experiment, write_experiment
 from dynident.effects import LawEffect
 from experiment_files import write_search
@@ -45,7 +46,9 @@ def test_what_is_hidden_is_not_told(simulated: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> None:
+def test_a_law_is_proposed_and_written(
+    simulated: Path, tmp_path: Path, run, sought, monkeypatch
+) -> None:
     """The hidden c v sin(k q + p), as its expansion; the verdict stays."""
     study, shared = simulated / "proposed.toml", tmp_path / "lab.toml"
     study.write_text((simulated / "study.toml").read_text())
@@ -67,7 +70,10 @@ def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> 
     assert found["explains"] > 0.85
     assert found["test_error_after"] < found["test_error_before"]
 
-    done = run("add", study, "--proposal", "1", "--json")
+    (diagnosis,) = sought
+    with monkeypatch.context() as known:  # which `add` would find again
+        known.setattr(studies, "diagnosis_of", lambda *_, **__: diagnosis)
+        done = run("add", study, "--proposal", "1", "--json")
     assert done.status == 0, done.err
     assert done.json["added"] == ["law:proposal1@elbow"]
     assert di.load(study).model.laws[0].torque == found["torque"]
