@@ -13,6 +13,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
+from notebooks.claims import OF_NOTEBOOKS
 from notebooks.forked_cells import run_cells
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
@@ -62,8 +63,11 @@ def test_there_are_notebooks() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
 def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, monkeypatch) -> None:
+    """And finds what is claimed of the records in it."""
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # no start-up files
     sources = [cell.source for cell in code_cells(read(path))]
+    if path.stem in OF_NOTEBOOKS:
+        sources.append(f"from notebooks import claims\n{OF_NOTEBOOKS[path.stem]}")
     outcomes = run_cells(sources, FOLDER, CELL_TIMEOUT)
     for source, outcome in zip(sources, outcomes, strict=True):
         assert not outcome.failure, f"{source}\n{outcome.failure}"

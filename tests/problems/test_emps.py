@@ -1,4 +1,7 @@
-"""EMPS, a measured benchmark: the published figures, and the path from the rigid body to them."""
+"""EMPS, a measured benchmark: the published figures.
+
+Of the path that leads to them from the rigid body: `notebooks/claims.py`.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import LeastSquares, diagnose, load
+from dynident import LeastSquares, load
 from dynident import fit as fit_model
 from dynident.fitting import Estimate
 from problem_scripts import script
@@ -64,27 +67,6 @@ def test_asymmetric_friction_is_reproduced_to_a_hundredth_of_a_percent() -> None
     for name, value in published["values"].items():
         assert ours[name] == pytest.approx(value, rel=tolerance)
     assert found.error == pytest.approx(published["error"], rel=tolerance)
-
-
-@needs_data
-@pytest.mark.slow
-def test_the_rigid_body_alone_leads_to_asymmetric_friction_and_a_ripple_and_no_further() -> None:
-    study = load(PROBLEM / "study.toml")
-    assert study.model.effects == ()
-    found = diagnose(study.model, study.train, study.test, propose="never")
-    names = [step.effect.name for step in found.steps]
-    assert set(names[:2]) == {"coulomb_friction", "viscous_friction"}
-    assert names[2:] == ["torque_offset", "asymmetric_friction", "torque_ripple"]
-    errors = [step.test_error_after for step in found.steps]
-    assert errors == sorted(errors, reverse=True)
-    assert found.test_error.after == pytest.approx(0.0297, abs=0.0015)
-    # A line in the force every 2.5 mm, whichever half of the record is looked at.
-    (k,) = found.steps[-1].effect.shape
-    assert 2e3 * np.pi / k == pytest.approx(2.5, abs=0.01)
-    assert found.noise_source == "replicates"
-    # What remains is four times what differs from one repetition to the next: that is said.
-    assert found.verdict == "unexplained"
-    assert not any(c.status == "material" for c in found.remaining)
 
 
 @needs_data

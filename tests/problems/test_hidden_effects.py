@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+import hidden_effects
+from dynident.diagnosis import diagnose
 from dynident.effects import catalogue
-from hidden_effects import FOREIGN, Case, run_case
+from hidden_effects import FOREIGN, Case, robot_case, run_case
+
+
+@pytest.fixture(autouse=True)
+def fewer_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One without and one with the payload to fit, and as many to judge by."""
+    monkeypatch.setattr(hidden_effects, "RUNS", 2)
 
 
 @pytest.mark.slow
@@ -36,5 +44,5 @@ def test_a_hidden_effect_is_suggested_first(effect: str, joint, source) -> None:
 @pytest.mark.slow
 def test_an_effect_in_no_catalogue_is_called_unknown() -> None:
     assert FOREIGN not in catalogue()
-    outcome = run_case(Case(FOREIGN, "elbow", None, 10.0, 4001))
-    assert outcome.verdict == "unexplained"
+    model, train, test = robot_case(Case(FOREIGN, "elbow", None, 10.0, 4001))
+    assert diagnose(model, train, test, propose="never").verdict == "unexplained"

@@ -80,15 +80,6 @@ def test_a_draft_of_the_raw_columns_has_those_of_the_study_by_hand(
     assert "coupling" not in said and not draft.open_question
 
 
-@pytest.mark.slow
-def test_the_draft_is_explained_as_the_study_by_hand(drafted: tuple[StudyDraft, Study]) -> None:
-    _, study = drafted
-    found = diagnose(study.model, study.train, most=2, propose="never")
-    first = {step.effect.label for step in found.steps}
-    assert first == {"joint_coupling@joint5:joint6", "joint_coupling@joint6:joint5"}
-    assert found.test_error.after <= 0.06
-
-
 def test_every_fourth_half_second_is_to_judge_by(study: Study) -> None:
     train, test = ([one.window for one in part.recordings] for part in (study.train, study.test))
     assert test == [(1.5, 2.0), (3.5, 4.0), (5.5, 6.0)]
