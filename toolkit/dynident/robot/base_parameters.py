@@ -9,25 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import qr, solve_triangular
+from numpy.typing import ArrayLike
+from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
 from dynident.moments.factors import RANK_TOLERANCE
+from dynident.robot.pivoted_columns import ROUNDING, PivotedColumns
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
 
-# A column this much smaller than the largest is rounding around zero, not a measurement.
-_ZERO = 1e-13
-# A diagonal entry this small (of the largest) is rounding in double precision, not geometry.
-_ROUNDING = 1e-9
 # A coefficient of a combination this small (in units of column norms) is rounding.
 _NEGLIGIBLE = 1e-8
-# How much the first of two equal columns is preferred as a pivot.
-_FAVOUR = 1e-6
 # Weight of a mass against the other parameters: where no torque shows it, it stays as described.
 _MASS_STAYS = 1e-3
 # Share of the typical mass below which a described mass cannot carry a first moment.
@@ -173,7 +167,7 @@ class BaseParameters:
 def base_parameters(
     matrix: ArrayLike,
     names: Sequence[str],
-    tolerance: float = _ROUNDING,
+    tolerance: float = ROUNDING,
     borne: ArrayLike = 0.0,
 ) -> BaseParameters:
     """Return the base parameters of a stacked regressor, or of its R factor.
@@ -204,28 +198,18 @@ def base_parameters(
     if not np.all(np.isfinite(X)):
         column = int(np.argmin(np.all(np.isfinite(X), axis=0)))
         raise FitError("the regressor is not finite", f"column '{names[column]}'")
-    scale = np.linalg.norm(X, axis=0)
-    scale[scale <= _ZERO * np.max(scale, initial=0.0)] = 0.0
-    full_norm = np.maximum(scale, borne)
-    hidden = (scale > 0.0) & (scale <= tolerance * full_norm)
-    near = hidden & (scale > _ROUNDING * full_norm)
-    scale[hidden] = 0.0
-    shown = np.flatnonzero(scale)
-    # Columns that say the same tie; the first in order wins, not the last bit of their norms.
-    favour = 1.0 - _FAVOUR * np.arange(len(shown)) / max(len(shown), 1)
-    norms = full_norm[shown] / favour
-    R, pivots = _pivoted_r(X[:, shown] / norms)
-    diagonal = np.abs(np.diag(R))
-    rank = int(np.count_nonzero(diagonal > tolerance * np.max(diagonal, initial=0.0)))
+    found = PivotedColumns.of(X, tolerance, borne)
+    scale, near, shown, norms = found.scale, found.near, found.shown, found.norms
+    R, pivots, diagonal, rank = found.R, found.pivots, found.diagonal, found.rank
     # In unit columns first: there a coefficient can be compared with 1.
     unit = solve_triangular(R[:rank, :rank], R[:rank, rank:]) if rank else np.zeros((0, len(shown)))
     unit[np.abs(unit) < _NEGLIGIBLE] = 0.0
     kept, rest = shown[pivots[:rank]], shown[pivots[rank:]]
     dropped = shown[pivots[rank : len(diagonal)]]
-    near[dropped] = diagonal[rank:] > _ROUNDING * np.max(diagonal, initial=0.0)
+    near[dropped] = diagonal[rank:] > ROUNDING * np.max(diagonal, initial=0.0)
     full = np.zeros((len(names), len(names)))
     full[np.ix_(kept, rest)] = unit * norms[pivots[rank:]] / norms[pivots[:rank]][:, None]
-    independent = np.sort(kept)
+    independent = found.independent
     dependent = np.setdiff1d(np.arange(len(names)), independent)
     K = full[np.ix_(independent, dependent)]
     for array in (K, scale, diagonal):
@@ -246,15 +230,6 @@ def base_parameters(
     )
 
 
-def _pivoted_r(X: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Return the R of the pivoted QR of X, without zero rows, and the pivots."""
-    if 0 in X.shape:
-        return np.zeros((0, X.shape[1])), np.arange(X.shape[1])
-    factors: Any = qr(X, mode="r", pivoting=True)
-    R, pivots = factors
-    return R[: min(R.shape)], pivots
-
-
 def structural_base(robot: Robot, seed: int = 0) -> BaseParameters:
     """Return the base parameters of a robot's inertial parameters, whatever the motion.
 
@@ -262,11 +237,31 @@ def structural_base(robot: Robot, seed: int = 0) -> BaseParameters:
     recording can. That an angle of a right angle is written with some digits (1.5707963, 1.5708)
     would show parameters by a hundred-thousandth of themselves; `RANK_TOLERANCE` leaves these out.
     """
-    samples = 20 * robot.n + 20
-    q, v, a = robot.random_motion(seed, samples)
+    q, v, a = structural_motion(robot, seed)
     regressor = robot.regressor(q, v, a).reshape(-1, 10 * robot.n)
     borne = np.tile(_borne(robot, a), robot.n)
     return base_parameters(regressor, robot.parameter_names, RANK_TOLERANCE, borne)
+
+
+def structural_motion(robot: Robot, seed: int = 0) -> tuple[Array, Array, Array]:
+    """Return the random motion (q, v, a) that shows all that any motion of a robot does."""
+    return robot.random_motion(seed, 20 * robot.n + 20)
+
+
+def structurally_independent(robot: Robot, regressor: Array, a: Array) -> list[int]:
+    """Return which columns `structural_base` keeps, ascending, for a regressor that is known.
+
+    Parameters
+    ----------
+    robot : Robot
+    regressor : (T, n, 10 n) ndarray
+        Along its `structural_motion`.
+    a : (T, n) ndarray
+        Accelerations of that.
+    """
+    borne = np.tile(_borne(robot, a), robot.n)
+    rows = regressor.reshape(-1, 10 * robot.n)
+    return [int(i) for i in PivotedColumns.of(rows, RANK_TOLERANCE, borne).independent]
 
 
 def _borne(robot: Robot, a: Array) -> Array:

@@ -16,8 +16,8 @@ small and as its inertias and friction are possible: of all torques negated noth
 seen. It is accepted where it wins by far (`hypothesis_search`, `gear_ratios`); what no regression
 tells, the unit of all torques, is judged by the described bodies (`described_torque`).
 
-Which way gravity pulls is told likewise (`mounting`): under another one, where that suits the
-columns by far, faults of columns are looked for again.
+Which way gravity pulls is told likewise (`mounting`, by `any_gravity`): under another one, where
+that suits the columns by far, faults of columns are looked for again.
 
 Of data: the same samples in training and test recordings, one source of two columns (`same_data`),
 a period after which the motion does not repeat (`stated_period`), a low-pass of the positions that

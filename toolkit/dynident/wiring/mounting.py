@@ -21,11 +21,12 @@ from dynident.effects.bodies.turn import turn_about
 from dynident.model import Model
 from dynident.robot import Robot
 from dynident.robot.tree import GRAVITY, Joint
+from dynident.wiring.any_gravity import AnyGravity
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault import Fault
 from dynident.wiring.fault_words import residuals
 from dynident.wiring.hypothesis_search import mends
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.wiring_regression import TorqueFit
 from dynident.wiring.wiring_rows import WiringRows
 
 _AXES = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
@@ -140,11 +141,10 @@ def mounting(
     """
     stated = model.robot.gravity
     size = float(np.linalg.norm(stated)) or float(np.linalg.norm(GRAVITY))
-    moved = rows.moved(now.change)
+    under = AnyGravity.of(model, rows.moved(now.change))
 
     def fit(gravity: np.ndarray) -> TorqueFit:
-        under = replace(model, robot=model.robot.with_gravity(gravity))
-        return WiringRegression.of(under, moved).fit(now.torque_of, now.torque_scale)
+        return under.regression(gravity).fit(now.torque_of, now.torque_scale)
 
     reference = stated if stated.any() else np.array(GRAVITY)
     start = fit(stated)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from dynident.model import Model
+from dynident.robot import Robot
 from dynident.wiring.wiring_rows import WiringRows
 
 OF_A_JOINT = 5
@@ -92,7 +93,24 @@ class WiringRegression:
         model : of which the robot and the width of friction count.
         rows : the motion and the torques.
         """
-        columns = _columns(model, rows)
+        robot, kept = model.robot, list(model.base.independent)
+        rigid = robot.regressor(rows.q, rows.v, rows.a)[:, :, kept]
+        return cls.of_rigid(rigid, inertia_columns(robot, rows, kept), model, rows)
+
+    @classmethod
+    def of_rigid(
+        cls, rigid: np.ndarray, inertia: np.ndarray, model: Model, rows: WiringRows
+    ) -> WiringRegression:
+        """Put what joints and motors have of their own beside columns of the rigid body.
+
+        Parameters
+        ----------
+        rigid : (T, n, r) along the motion.
+        inertia : (n, r) as of `inertia_columns`.
+        model : of which the width of friction counts.
+        rows : the motion and the torques.
+        """
+        columns = _columns(rigid, model, rows)
         n = columns.shape[1]
         by_joint = columns.transpose(1, 0, 2) * rows.counts.T[:, :, None]
         own = columns.shape[2] - OF_A_JOINT * n
@@ -106,7 +124,7 @@ class WiringRegression:
             gram=by_joint.transpose(0, 2, 1) @ by_joint,
             cross=np.swapaxes(by_joint.transpose(0, 2, 1) @ rows.tau, 1, 2),
             power=rows.counts.T @ rows.tau**2,
-            inertia_of=_inertia_of(model, rows, columns.shape[2]),
+            inertia_of=_inertia_of(inertia, columns.shape[2]),
             friction_of=friction_of,
         )
 
@@ -145,15 +163,14 @@ class WiringRegression:
         )
 
 
-def _columns(model: Model, rows: WiringRows) -> np.ndarray:
+def _columns(rigid: np.ndarray, model: Model, rows: WiringRows) -> np.ndarray:
     """Columns of base parameters, of shared motors, and five of each joint's own, (T, n, p)."""
-    robot, kept = model.robot, list(model.base.independent)
-    samples, n = rows.q.shape
+    samples, n, kept = rigid.shape
     shared = _of_shared_motors(rows, model.friction_widths)
-    first = len(kept) + len(shared)
+    first = kept + len(shared)
     columns = np.zeros((samples, n, first + OF_A_JOINT * n))
-    columns[:, :, : len(kept)] = robot.regressor(rows.q, rows.v, rows.a)[:, :, kept]
-    for k, one in enumerate(shared, start=len(kept)):
+    columns[:, :, :kept] = rigid
+    for k, one in enumerate(shared, start=kept):
         columns[:, :, k] = one
     dry = np.tanh(rows.v / model.friction_widths)
     for j in range(n):
@@ -173,19 +190,34 @@ def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def _inertia_of(model: Model, rows: WiringRows, size: int) -> np.ndarray:
-    """Mean inertia at each joint, (n, p): the torque of a unit of acceleration, gravity off."""
-    robot, kept = model.robot, list(model.base.independent)
+def inertia_columns(robot: Robot, rows: WiringRows, kept: list[int]) -> np.ndarray:
+    """Mean inertia at each joint, (n, r): the torque of a unit of acceleration, gravity off.
+
+    Parameters
+    ----------
+    robot : whose bodies' parameters it is linear in.
+    rows : positions at some of which it is looked at.
+    kept : numbers of the r parameters.
+    """
     n = robot.n
     at = np.linspace(0, len(rows.q) - 1, min(_STATES, len(rows.q))).round().astype(int)
     q = rows.q[at]
     rest = np.zeros_like(q)
     still = robot.regressor(q, rest, rest)
-    found = np.zeros((n, size))
+    found = np.zeros((n, len(kept)))
     for j in range(n):
         pushed = np.array(rest)
         pushed[:, j] = 1.0
         column = (robot.regressor(q, rest, pushed) - still)[:, j, kept]
-        found[j, : len(kept)] = column.mean(axis=0)
+        found[j] = column.mean(axis=0)
+    return found
+
+
+def _inertia_of(bodies: np.ndarray, size: int) -> np.ndarray:
+    """Mean inertia at each joint, (n, p): of the bodies, (n, r), and of the joint's rotor."""
+    n, rigid = bodies.shape
+    found = np.zeros((n, size))
+    found[:, :rigid] = bodies
+    for j in range(n):
         found[j, size - OF_A_JOINT * (n - j) + 2] = 1.0
     return found
