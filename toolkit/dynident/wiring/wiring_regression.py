@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from dynident.model import Model
 from dynident.robot import Robot
@@ -145,12 +145,12 @@ class WiringRegression:
             A = (weight @ self.gram.reshape(n, -1)).reshape(len(self.gram[0]), -1)
             # A column of zeros, of a joint at rest, is known by the ridge alone.
             size = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
-            factor = cho_factor(A / np.outer(size, size) + _RIDGE * np.eye(len(A)))
-            values = cho_solve(factor, (weight @ cross) / size) / size
+            factor = _cholesky(A / np.outer(size, size) + _RIDGE * np.eye(len(A)))
+            values = _solved(factor, (weight @ cross) / size) / size
             quadratic = (self.gram @ values) @ values
             left = np.maximum(power - 2 * cross @ values + quadratic, 0.0)
         wanted = np.concatenate([self.inertia_of, self.friction_of])
-        spread = np.sqrt(np.sum((wanted / size) * cho_solve(factor, (wanted / size).T).T, axis=1))
+        spread = np.sqrt(np.sum((wanted / size) * _solved(factor, (wanted / size).T).T, axis=1))
         found = wanted @ values
         z = np.divide(found, spread, out=np.zeros_like(found), where=spread > 0)
         return TorqueFit(
@@ -188,6 +188,18 @@ def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
             v, a = rows.v @ turns, rows.a @ turns
             found += [np.outer(one, turns) for one in (v, np.tanh(v / width), a)]
     return found
+
+
+def _cholesky(A: np.ndarray) -> np.ndarray:
+    """The factor of a small matrix, of which SciPy's own functions ask for longer than it takes."""
+    factor, failed = dpotrf(A, lower=0, clean=0)
+    if failed:
+        raise np.linalg.LinAlgError("the moments of the wiring are not positive definite")
+    return factor
+
+
+def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return dpotrs(factor, right, lower=0)[0]
 
 
 def inertia_columns(robot: Robot, rows: WiringRows, kept: list[int]) -> np.ndarray:
