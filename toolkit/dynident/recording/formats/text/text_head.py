@@ -72,7 +72,11 @@ class TextHead:
     def plain(self, lines: bytes) -> bytes:
         """Return lines of samples with one mark between columns, and decimal points."""
         if self.separator == " ":
-            lines = re.sub(rb" +", b",", re.sub(rb"^ +| +$", b"", lines, flags=re.MULTILINE))
+            # Not by patterns, which are tried at every byte.
+            while b"  " in lines:
+                lines = lines.replace(b"  ", b" ")
+            lines = lines.replace(b" \n", b"\n").replace(b"\n ", b"\n")
+            lines = lines.removeprefix(b" ").removesuffix(b" ").replace(b" ", b",")
         return lines.replace(b",", b".") if self.decimal == "," else lines
 
 
