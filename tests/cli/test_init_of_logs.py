@@ -10,35 +10,27 @@ import pytest
 
 pytest.importorskip("rosbags", reason="bags need the extra `ros`, which is a part of `test`")
 
-import ampere_logs
 import bag_logs
 import dynident as di
 from chains import chain_text
 from dynident.recording import Recording, write
 from ros_bags import KINDS, write_bag
+from study_files import write_study
 from synthetic import smooth_motion
 
 
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("logs")
-    ampere_logs.write_logs(folder, 30.0, 2)
-    return folder
-
-
-@pytest.mark.slow
-def test_loads_are_said_on_the_command_line(run, logs: Path) -> None:
-    log = logs / "run_load_1.csv"
+def test_loads_are_said_on_the_command_line(run, tmp_path: Path) -> None:
+    write_study(tmp_path)
     for said, message in (
-        ("run_load_*=heavy", "'heavy' is no mass in kg"),
-        ("run_load_*=-2", "a load of -2 kg"),
+        ("tra*=heavy", "'heavy' is no mass in kg"),
+        ("tra*=-2", "a load of -2 kg"),
         ("crate_*=2.8", "no file is called 'crate_*'"),
     ):
-        done = run("init", logs / "arm.urdf", log, "--out", "new.toml", "--load", said)
+        done = run("init", "arm.urdf", "train.csv", "--out", "new.toml", "--load", said)
         assert done.status == 2
         assert message in done.err
         assert not Path("new.toml").exists()
-    done = run("init", logs / "arm.urdf", log, "--out", "new.toml", "--load", "run*=2.8", "--json")
+    done = run("init", "arm.urdf", "train.csv", "--out", "new.toml", "--load", "tra*=2.8", "--json")
     assert done.status == 0, done.err
     assert 'payload = "load"' in Path("new.toml").read_text()
     assert json.loads(done.out)["out"] == "new.toml"
