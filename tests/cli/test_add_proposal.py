@@ -39,7 +39,7 @@ def misleading(tmp_path: Path) -> Path:
 def test_the_law_is_written_and_not_what_it_is_proposed_instead_of(misleading, run, sought) -> None:
     """By a name that no law of a file has."""
     misleading.with_name("lab.toml").write_text('[laws.proposal1]\ntorque = "c*v^2*q"\n')
-    misleading.write_text('laws = ["lab.toml"]\n' + misleading.read_text())
+    misleading.write_text(misleading.read_text() + '\n[laws]\nlab = "lab.toml"\n')
     done = run("add", misleading, "--proposal", "1", "--json")
     assert done.status == 0, done.err
     assert done.json["added"] == ["law:proposal2@elbow"]
@@ -48,8 +48,8 @@ def test_the_law_is_written_and_not_what_it_is_proposed_instead_of(misleading, r
     assert after < 0.4 * before
     model = di.load(misleading).model
     assert {one.name: one.torque for one in model.laws} == {
-        "law:proposal1": "c*v^2*q",
-        "law:proposal2": LAW,
+        "proposal1": "c*v^2*q",
+        "proposal2": LAW,
     }
     assert {one.name for one in model.effects} == {
         "viscous_friction",
