@@ -86,13 +86,17 @@ def test_a_law_is_proposed_and_written(
 
 
 @pytest.mark.slow
-def test_nothing_is_proposed_for_a_complete_model(simulated: Path, run) -> None:
+def test_nothing_is_proposed_for_a_complete_model(
+    simulated: Path, run, sought, monkeypatch
+) -> None:
     study = simulated / "complete.toml"
     text = (simulated / "study.toml").read_text()
     study.write_text(text.replace("effects = [", 'effects = ["law:wave@elbow", ') + WAVE)
     done = run("explain", study, "--propose", "--json")
     assert done.json["verdict"] == "nothing_missing"
     assert done.json["proposals"] == []
+    (diagnosis,) = sought
+    monkeypatch.setattr(studies, "diagnosis_of", lambda *_, **__: diagnosis)
     done = run("add", study, "--proposal", "1")
     assert done.status == 2
     assert "none was made" in done.err
