@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,8 +26,13 @@ LEVELS = [
 
 
 @cache
+def arm(position_std: float) -> Any:
+    return table.arm(position_std, 1, DURATION)
+
+
+@cache
 def estimates(position_std: float) -> dict[str, di.Estimate]:
-    return table.errors(table.arm(position_std, 1, DURATION))
+    return table.errors(arm(position_std))
 
 
 @pytest.mark.parametrize("position_std", LEVELS)
@@ -34,7 +40,7 @@ def estimates(position_std: float) -> dict[str, di.Estimate]:
 def test_instruments_beat_unfiltered_least_squares_and_cost_nothing_filtered(
     position_std: float,
 ) -> None:
-    one = table.arm(position_std, 1, DURATION)
+    one = arm(position_std)
     found = {name: one.error(e) for name, e in estimates(position_std).items()}
     least = PUBLISHED["least_ratio"]
     assert found["least squares, unfiltered"] > least * found["instruments, unfiltered"]
