@@ -48,7 +48,7 @@ def test_healthy_studies_are_left_alone(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "every"), [("double_pendulum", 1), ("emps", 1), ("panda", 11)])
+@pytest.mark.parametrize(("name", "every"), [("double_pendulum", 1), ("emps", 1), ("panda", 4)])
 def test_faults_in_measured_records_are_named(name: str, every: int) -> None:
     given = study(ROOT / "problems" / name / "study.toml")
     names, named, total = given.robot.names, 0, 0
