@@ -63,6 +63,8 @@ def test_an_effect_is_found_above_its_limit_and_not_far_below(
     of_one = np.sqrt(np.mean([np.mean((a.tau - b.tau)[:, joint] ** 2) for a, b in pairs]))
     above = diagnosed(model, **{name: 1.4 * size / of_one})
     assert [step.effect.label for step in above.steps] == [label]
+    assert above.detection_limits == (), "of what is found beside something that is missing"
+    assert "detection_limits" not in above.to_dict()
     below = diagnosed(model, **{name: 0.4 * size / of_one})
     assert below.verdict == "nothing_missing"
 
@@ -93,9 +95,3 @@ def test_the_limit_at_a_joint_is_of_effects_there(healthy: Diagnosis) -> None:
     (row,) = (row for row in limit_table(tuple(here)).rows if row[0] == "joint spring")
     assert row[2] == "-" != row[1]
     assert any(note.startswith("A dash") for note in limit_table(tuple(here)).notes)
-
-
-def test_where_something_is_missing_no_limit_is_stated() -> None:
-    found = diagnosed(MODEL + "torque_offset@elbow", offset__elbow=0.5)
-    assert found.steps and found.detection_limits == ()
-    assert "detection_limits" not in found.to_dict()

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from brief_search import BRIEF
 from dynident import compare
 from dynident import diagnose as find
 from dynident import fit as fit_model
@@ -136,7 +137,7 @@ def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None
 def test_beside_a_payload_that_was_found_the_search_for_what_is_left_goes_on(model: Model) -> None:
     train, test = recordings(model, "payload", PAYLOAD, **NOISE)
     train, test = (Dataset(tuple(map(strange, part))) for part in (train, test))
-    found = find(model, train, test)
+    found = find(model, train, test, propose="never", criteria=BRIEF)
     assert found.verdict == "unexplained"
     assert [one.effect.label for one in found.steps] == ["payload"]
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import dynident as di
+from brief_search import BRIEF
 from dynident.diagnosis import Diagnosis, procedure
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.recording import Dataset
@@ -25,7 +26,8 @@ def found(stiffness: float, preload: float, rotor: float) -> Diagnosis:
     values[true.slices[SPRING]] = stiffness, preload
     values[true.slices[ROTOR]] = rotor
     runs = [synthetic(true, values, seed, rate_hz=250.0, torque_std=0.02) for seed in range(3)]
-    return di.diagnose(given, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:])), propose="never")
+    train, test = Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:]))
+    return di.diagnose(given, train, test, propose="never", criteria=BRIEF)
 
 
 @pytest.mark.slow

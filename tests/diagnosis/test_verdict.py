@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from brief_search import BRIEF
 from dynident import diagnose as find
 from dynident.evidence import compare_models
 from dynident.model import Model
@@ -42,7 +43,8 @@ def with_contact(recording: Recording, size: float) -> Recording:
 def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size: float) -> None:
     """However short: it is in every period, and no noise is."""
     runs = tuple(with_contact(one, size) for one in recordings(model))
-    found = find(model, Dataset(runs[:3]), Dataset(runs[3:]), propose="never")
+    train, test = Dataset(runs[:3]), Dataset(runs[3:])
+    found = find(model, train, test, propose="never", criteria=BRIEF)
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
 
@@ -52,7 +54,7 @@ def test_what_only_a_training_recording_shows_is_not_called_noise(model: Model) 
     """It returns in its every period, and the motions that judge are elsewhere."""
     runs = recordings(model)
     train = Dataset((with_contact(runs[0], 8.0), *runs[1:3]))
-    found = find(model, train, Dataset(runs[3:]), propose="never")
+    found = find(model, train, Dataset(runs[3:]), propose="never", criteria=BRIEF)
     assert found.verdict == "unexplained"
     assert found.training_only == ("elbow",) and "held-out recordings do not show" in found.sentence
     assert found.to_dict()["training_only"] == ["elbow"] and not found.confidence

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from brief_search import BRIEF
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.details import JointFall
 from dynident.diagnosis.leading_effects import MOST_OF_IT, LeadingEffects
@@ -127,7 +128,8 @@ def test_no_law_is_proposed_while_the_catalogue_has_more() -> None:
     values = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
     truth = true_values(full, **values, k__elbow=2.5, c__elbow=-0.4)
     runs = tuple(synthetic(full, truth, seed, rate_hz=250.0, torque_std=0.1) for seed in range(3))
-    found = diagnose(given, Dataset(runs[:2]), Dataset(runs[2:]), most=1)
+    train, test = Dataset(runs[:2]), Dataset(runs[2:])
+    found = diagnose(given, train, test, most=1, criteria=BRIEF)
     assert found.verdict == "unexplained" and found.limit == 1
     assert found.proposals == ()
 

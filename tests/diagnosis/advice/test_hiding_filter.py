@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from brief_search import BRIEF
 from dynident.diagnosis import diagnose
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, suited_filter, suited_instead
@@ -42,7 +43,7 @@ def test_the_filter_is_named_before_the_pictures(cutoff_hz: float | None, hides:
         filter = replace(filter, position_cutoff_hz=cutoff_hz)
     model = Model(arm()) + "viscous_friction" + "coulomb_friction"
     train, test = (replace(one, filter=filter) for one in (train, test))
-    found = diagnose(model, train, test, propose="never", most=1)
+    found = diagnose(model, train, test, propose="never", most=1, criteria=BRIEF)
     assert (found.hiding_filter is not None) == hides
     first, said = next_steps(found)[0], headline(found)
     assert ("out of [filter]" in first.what) == hides

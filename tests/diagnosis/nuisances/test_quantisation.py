@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from brief_search import BRIEF
 from dynident import diagnose as find
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -104,7 +105,8 @@ def test_the_same_residual_without_steps_is_unexplained(model: Model) -> None:
 @pytest.mark.slow
 def test_a_search_takes_the_same_residual_without_steps_for_missing_physics(model: Model) -> None:
     moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 2))
-    judged = find(model, Dataset(moved[:1]), Dataset(moved[1:]), propose="never")
+    train, test = Dataset(moved[:1]), Dataset(moved[1:])
+    judged = find(model, train, test, propose="never", criteria=BRIEF)
     assert judged.verdict != "nothing_missing"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from brief_search import BRIEF
 from dynident.diagnosis.nuisances.reversal_laws import (
     _best_law,
     laws_of_the_rest,
@@ -167,7 +168,7 @@ def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
 def test_friction_that_lags_is_never_nothing() -> None:
     """It has a memory: neither a rival's name nor rows left out make that go away."""
     train, test = dataset(0, 1, lead=-6e-3), dataset(7, lead=-6e-3)
-    said = di.diagnose(given(), train, test, propose="never")
+    said = di.diagnose(given(), train, test, propose="never", criteria=BRIEF)
     assert said.verdict == "unexplained" or said.steps
     assert not said.reversals_left_out
 
@@ -177,5 +178,5 @@ def test_a_study_that_asks_for_every_row_keeps_it() -> None:
     # Fewer rows of each second tell the same: without "keep" a quarter of the elbow's is left out.
     every = di.Filter(position_cutoff_hz=40.0, rate_hz=125.0, ends="keep")
     train = replace(dataset(0, 1, lead=6e-3), filter=every)
-    said = di.diagnose(given(), train, most=1, propose="never")
+    said = di.diagnose(given(), train, most=1, propose="never", criteria=BRIEF)
     assert not said.reversals_left_out

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from brief_search import BRIEF
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from synthetic import arm, synthetic, true_values
@@ -40,7 +41,8 @@ def test_half_a_sample_is_told_where_it_is_misstated_and_only_there(
     truth: Torque, said: Torque
 ) -> None:
     each = [_recording(seed, truth, said) for seed in range(3)]
-    found = di.diagnose(_model(), Dataset(tuple(each[:2])), Dataset((each[2],)), propose="never")
+    train, test = Dataset(tuple(each[:2])), Dataset((each[2],))
+    found = di.diagnose(_model(), train, test, propose="never", criteria=BRIEF)
     assert (found.sampled is None) == (truth == said)
     if found.sampled is not None:
         later = found.sampled.later_s

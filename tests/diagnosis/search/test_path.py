@@ -6,6 +6,7 @@ from functools import cache
 
 import pytest
 
+from brief_search import BRIEF
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.details import Withdrawn, named_together
@@ -80,7 +81,8 @@ def test_no_twin_of_what_was_withdrawn_takes_its_place() -> None:
 
 @cache
 def from_the_rigid_body(most: int) -> Diagnosis:
-    return find(Model(arm()), data(FULL, {}, 0, 1), data(FULL, {}, 2), most=most)
+    train, test = data(FULL, {}, 0, 1), data(FULL, {}, 2)
+    return find(Model(arm()), train, test, most=most, criteria=BRIEF)
 
 
 @pytest.mark.slow
@@ -109,7 +111,7 @@ def test_a_warm_motor_in_some_recordings_is_no_payload() -> None:
     warm = data(shifted, {"offset__shoulder": 1.0}, 1, 3).recordings
     cold = data(FULL, {}, 0, 2).recordings
     train = Dataset((cold[0], warm[0], cold[1]))
-    found = find(FULL, train, Dataset((warm[1],)))
+    found = find(FULL, train, Dataset((warm[1],)), propose="never", criteria=BRIEF)
     assert not any(one.effect.is_payload for one in found.steps)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from brief_search import BRIEF
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.extension import extending
@@ -37,7 +38,7 @@ def recordings(true: Model, changed: dict[str, float], many: int) -> Dataset:
 
 def diagnosed(true: Model = FULL, **changed: float) -> Diagnosis:
     each = recordings(true, changed, 3).recordings
-    return find(FULL, Dataset(each[:2]), Dataset(each[2:]))
+    return find(FULL, Dataset(each[:2]), Dataset(each[2:]), criteria=BRIEF)
 
 
 def test_a_model_without_residual_whose_friction_drives_a_joint_is_not_complete() -> None:
