@@ -21,7 +21,7 @@ def found(criteria: Criteria) -> Diagnosis:
     full = PLAIN + "quadratic_drag@shoulder"
     truth = true_values(full, **FRICTION, Fq__shoulder=0.4)
     made = tuple(
-        synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+        synthetic(full, truth, seed, rate_hz=100.0, position_std=2e-5, torque_std=0.3)
         for seed in range(2)
     )
     return diagnose(PLAIN, Dataset(made), criteria=criteria, propose="never")

@@ -37,10 +37,10 @@ def truth(
     return full, theta
 
 
-def recordings(full: Model, theta: np.ndarray) -> list[Recording]:
+def recordings(full: Model, theta: np.ndarray, runs: int = RUNS) -> list[Recording]:
     """Runs of a session, one after the other, every motion twice; torques are the model's."""
     made = []
-    for seed in range(RUNS):
+    for seed in range(runs):
         rng = np.random.default_rng([seed, 3])
         t, q, v, a = smooth_motion(2, seed, RATE, 2.0 * PERIOD, PERIOD)
         q, start = q + HANGING, 20.0 * seed
@@ -56,7 +56,7 @@ def recordings(full: Model, theta: np.ndarray) -> list[Recording]:
 
 
 def diagnosed(label: str, values: tuple[float, ...], shape: tuple[float, ...] = ()) -> Diagnosis:
-    made = recordings(*truth(label, values, shape))
+    made = recordings(*truth(label, values, shape), runs=3)
     return find(PLAIN, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
 
 

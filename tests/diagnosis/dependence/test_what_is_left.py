@@ -29,7 +29,7 @@ def unrepeated(seed: int, **recorded: Any) -> Recording:
 
 def once(seed: int, hidden: float) -> Recording:
     """The same with a viscosity at the elbow that depends on its position."""
-    made = unrepeated(seed, rate_hz=200.0, torque_std=0.1)
+    made = unrepeated(seed, rate_hz=100.0, torque_std=0.1)
     v = np.gradient(made.q[:, 1], made.t)
     push = np.column_stack([np.zeros_like(v), hidden * v * np.sin(3.0 * made.q[:, 1])])
     return replace(made, tau=made.tau + push)
@@ -61,7 +61,7 @@ def test_a_product_of_two_speeds_is_found_without_a_noise_floor() -> None:
     """No function of one joint's position and velocity predicts it."""
 
     def coupled(seed: int) -> Recording:
-        made = unrepeated(seed, rate_hz=200.0, torque_std=0.1)
+        made = unrepeated(seed, rate_hz=100.0, torque_std=0.1)
         v = np.gradient(made.q, made.t, axis=0)
         push = np.column_stack([0.5 * v[:, 0] * v[:, 1], np.zeros(len(v))])
         return replace(made, tau=made.tau + push)
