@@ -153,7 +153,7 @@ def test_friction_that_falls_with_speed_is_more_than_any_law_of_dry_friction() -
 def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
     stribeck: float, found: list[str]
 ) -> None:
-    train = dataset(0, 1, 2, lead=6e-3, stribeck=stribeck)
+    train = dataset(0, 1, lead=6e-3, stribeck=stribeck)
     said = di.diagnose(given(), train, dataset(7, lead=6e-3, stribeck=stribeck))
     assert [step.effect.label for step in said.steps] == found
     assert said.verdict == ("explained" if found else "nothing_missing")

@@ -10,7 +10,6 @@ Models of Hysteresis, 1994).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
 
 import numpy as np
 
@@ -126,5 +125,12 @@ def _past(one: ResidualRecord, joint: int, spread: float) -> np.ndarray:
 
 def _stopped(q: np.ndarray, most: float) -> np.ndarray:
     """Displacement (T,) of a spring with position q that slides beyond a displacement."""
-    steps = np.diff(q, prepend=q[:1]).tolist()
-    return np.array(list(accumulate(steps, lambda z, step: min(max(z + step, -most), most))))
+    z, found = 0.0, []
+    for step in np.diff(q, prepend=q[:1]).tolist():
+        z += step
+        if z > most:
+            z = most
+        elif z < -most:
+            z = -most
+        found.append(z)
+    return np.array(found)
