@@ -31,11 +31,8 @@ def found(stiffness: float, preload: float, rotor: float) -> Diagnosis:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stiffness", "preload", "rotor"), [(0.3, 0.3, 0.05), (0.2, 0.4, 0.05)])
-def test_a_spring_and_a_rotor_are_found_though_an_offset_comes_first(
-    stiffness: float, preload: float, rotor: float
-) -> None:
-    said = found(stiffness, preload, rotor)
+def test_a_spring_and_a_rotor_are_found_though_an_offset_comes_first() -> None:
+    said = found(0.2, 0.4, 0.05)
     assert {step.effect.label for step in said.steps} == {SPRING, ROTOR}
     assert said.verdict == "explained"
 
