@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brief_search import BRIEF
 from dynident import diagnose
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.dependence.bursts import beyond_reversals, burst_notes, bursts_in
@@ -175,7 +174,7 @@ def test_without_a_noise_floor_knocks_are_told_and_are_no_noise() -> None:
         return one.replace(tau=tau, period=None)
 
     train = Dataset((recorded(0, (3.0, 9.0)), recorded(1, (5.0,))))
-    found = diagnose(model, train, Dataset((recorded(2, ()),)), propose="never", criteria=BRIEF)
+    found = diagnose(model, train, Dataset((recorded(2, ()),)), propose="never")
     said = [note for note in found.notes if "largest of" in note]
     assert len(said) == 1
     assert "; at elbow the " in said[0] and "shoulder" not in said[0]
