@@ -35,6 +35,11 @@ class Tab:
     requests: list[str] = field(default_factory=list)
     pending: set[Any] = field(default_factory=set)
 
+    def go(self, url: str) -> None:
+        """Open another page in the place of this one."""
+        self.home = url
+        self.page.goto(url)
+
     def wait_for_answers(self) -> None:
         """Wait until all that was asked for has been answered, and nothing follows from it."""
         seen = -1
@@ -77,8 +82,16 @@ def opened(browser: Any, url: str, width: int, kind: type[OneTab]) -> OneTab:
     return found
 
 
-def serious_faults(page: Any) -> Sequence[tuple[str, list[str]]]:
-    """What axe-core finds that keeps readers out: its name, and the first places."""
-    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+def serious_faults(page: Any, colours: bool = True) -> Sequence[tuple[str, list[str]]]:
+    """What axe-core finds that keeps readers out: its name, and the first places.
+
+    Parameters
+    ----------
+    page : as it is now.
+    colours : whether to look for text that stands out too little, which takes most of the time.
+    """
+    rules = {"color-contrast": {"enabled": colours}}
+    options = {"resultTypes": ["violations"], "rules": rules}
+    found = Axe().run(page, options=options).response["violations"]
     serious = [one for one in found if one["impact"] in ("serious", "critical")]
     return [(one["id"], [node["html"][:90] for node in one["nodes"][:3]]) for one in serious]
