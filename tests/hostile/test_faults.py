@@ -98,12 +98,15 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
 @pytest.mark.parametrize(
     "around",
     [
-        {"LC_ALL": "tr_TR.UTF-8"},
-        {"LC_ALL": "C", "PYTHONIOENCODING": "ascii"},
-        {"HOME": "/nowhere/at/all", "XDG_CACHE_HOME": "/dev/null/x", "XDG_CONFIG_HOME": ""},
-        {"HOME": ""},
+        {
+            "LC_ALL": "tr_TR.UTF-8",
+            "HOME": "/nowhere/at/all",
+            "XDG_CACHE_HOME": "/dev/null/x",
+            "XDG_CONFIG_HOME": "",
+        },
+        {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "HOME": ""},
     ],
-    ids=["Turkish", "ASCII", "no HOME", "an empty HOME"],
+    ids=["Turkish without HOME", "ASCII with an empty HOME"],
 )
 def test_odd_surroundings_change_no_file(usual, around: dict[str, str], tmp_path: Path) -> None:
     assert added_and_fitted(tmp_path / "odd", around) == usual

@@ -10,7 +10,7 @@ import pytest
 
 from dynident.cli import commands, main
 from hostile.kills import Written, content, killed_after, killed_within, no_room, written
-from hostile.writers import ALIKE, IN_PLACE, MARKED, READ, WRITERS, Writer, prepare
+from hostile.writers import ALIKE, IN_PLACE, READ, WITH_CODE_OF_THEIR_OWN, WRITERS, Writer, prepare
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
@@ -19,7 +19,7 @@ pytestmark = [
 LINES = (2, 9, 17)
 
 
-@pytest.fixture(scope="module", params=MARKED)
+@pytest.fixture(scope="module", params=WITH_CODE_OF_THEIR_OWN)
 def writer(request: pytest.FixtureRequest) -> Writer:
     return WRITERS[request.param]
 

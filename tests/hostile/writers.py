@@ -126,12 +126,13 @@ WRITERS = {
         results={"old.png": _picture},
     ),
     "laws": Writer(
-        words=("explain", "law/study.toml", "--laws", "l.toml"), results={"l.toml": _toml}
+        words=("explain", "law/study.toml", "--most", "1", "--laws", "l.toml"),
+        results={"l.toml": _toml},
     ),
     "open": Writer(words=("open", "study.toml", "--no-browser"), results={"study.toml": di.load}),
 }
 
-ALIKE = {"explain --design": "design"}
+ALIKE = {"explain --design": "design", "demo --design": "experiment"}
 """Options that write with the code of another writer, and take long to get there."""
 IN_PLACE = ("add study", "open study")
 """Arguments that are written to as well as read."""
@@ -151,6 +152,8 @@ LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"}
 """Commands that take seconds: `make test-fast` leaves them out."""
 MARKED = [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS]
 each_writer = pytest.mark.parametrize("name", MARKED)
+WITH_CODE_OF_THEIR_OWN = [one for one in MARKED if one.values[0] != "demo of a design"]
+"""Less what begins to write as another does, see `ALIKE`."""
 
 
 def prepare(folder: Path) -> None:
@@ -175,12 +178,12 @@ def prepare(folder: Path) -> None:
     (folder / "law" / "arm.urdf").write_text(ARM)
     for one, text in zip(("train.csv", "test.csv"), _with_a_law(), strict=True):
         place(folder / "law" / one, text)
-    place(folder / "law" / "study.toml", STUDY.replace(*_ALL_FRICTION))
+    place(folder / "law" / "study.toml", STUDY.replace(*_ALL_BUT_THE_LAW))
 
 
-_ALL_FRICTION = (
+_ALL_BUT_THE_LAW = (
     'effects = ["viscous_friction"]',
-    'effects = ["viscous_friction", "coulomb_friction"]',
+    'effects = ["viscous_friction", "coulomb_friction", "joint_spring", "torque_ripple"]',
 )
 
 
