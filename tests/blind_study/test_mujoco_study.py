@@ -76,7 +76,7 @@ def test_records_of_a_case_are_cut_out_of_motion_and_say_nothing_of_it(tmp_path:
         and c.circumstances.rate_hz <= 500
         and c.circumstances.repetition == "none"
     )
-    truth = make(case, tmp_path, Size(runs=2, tests=1, repetitions=1))
+    truth = make(case, tmp_path, Size(runs=1, tests=1, repetitions=1))
     assert truth["rate_hz"] == case.circumstances.rate_hz
     study = load_study(tmp_path / "study.toml")
     text = (tmp_path / "study.toml").read_text()
@@ -99,7 +99,7 @@ def test_a_healthy_robot_in_mujoco_is_found_healthy(tmp_path: Path, capfd) -> No
         and c.width == c.stated_width
     ]
     ask = ["run", "--plant", "mujoco", "--seed", "50000", "--count", "100", "--jobs", "1"]
-    ask += ["--runs", "2", "1"]
+    ask += ["--runs", "1", "1"]
     ask += ["--out", str(tmp_path), "--numbers", str(cases[0].number), "--filter", "both"]
     main(ask)
     (line,) = (tmp_path / "answers.jsonl").read_text().splitlines()
