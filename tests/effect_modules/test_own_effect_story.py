@@ -120,34 +120,32 @@ def test_the_packages_own_need_no_origin(saved):
     assert foreign["origin"]["file"] == "mine.py" and foreign["origin"]["package"] == ""
 
 
-@pytest.mark.parametrize(
-    ("origin", "words"),
-    [
+def refused(saved: Path, origin: object, words: str) -> str:
+    """What is said of an estimate with an effect that nobody knows, and this origin."""
+    content = json.loads(saved.read_text())
+    content["model"]["effects"][-1] |= {"effect": "no_such_effect", "origin": origin}
+    other = saved.with_name("other.json")
+    other.write_text(json.dumps(content))
+    with pytest.raises(FitError, match=words) as told:
+        di.load_estimate(other)
+    return str(told.value)
+
+
+@pytest.mark.slow
+def test_other_places_are_named_too(saved):
+    said = json.loads(saved.read_text())["model"]["effects"][-1]["origin"]
+    for origin, words in (
         ({"package": "our-lab"}, "came from the package our-lab: install it"),
         ({"file": ""}, "came from a notebook or a console: define it again before"),
         ({"file": "x" * 500}, "came from x{80}: import"),
-    ],
-)
-@pytest.mark.slow
-def test_other_places_are_named_too(saved, origin, words):
-    content = json.loads(saved.read_text())
-    effect = content["model"]["effects"][-1]
-    effect["effect"] = "no_such_effect"
-    effect["origin"] |= origin
-    saved.write_text(json.dumps(content))
-    with pytest.raises(FitError, match=words) as told:
-        di.load_estimate(saved)
-    assert len(str(told.value).splitlines()) == 1
+    ):
+        assert len(refused(saved, said | origin, words).splitlines()) == 1
 
 
-@pytest.mark.parametrize("origin", [None, 7, {}, {"module": 1, "file": "", "package": ""}, []])
 @pytest.mark.slow
-def test_an_origin_that_is_none_is_refused(saved, origin):
-    content = json.loads(saved.read_text())
-    content["model"]["effects"][-1] |= {"effect": "no_such_effect", "origin": origin}
-    saved.write_text(json.dumps(content))
-    with pytest.raises(FitError, match="is not a dynident estimate"):
-        di.load_estimate(saved)
+def test_an_origin_that_is_none_is_refused(saved):
+    for origin in (None, 7, {}, {"module": 1, "file": "", "package": ""}, []):
+        refused(saved, origin, "is not a dynident estimate")
 
 
 def test_a_notebook_is_told_from_a_file():
