@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.linalg import get_lapack_funcs
 
 from dynident.model import Model
 from dynident.robot import Robot
@@ -24,6 +24,7 @@ _RIDGE = 1e-11
 _LEAST = 1e-5
 """Share of the torque's power below which a residual is as good as none."""
 _STATES = 12  # positions at which the inertia is looked at
+_potrf, _potrs = get_lapack_funcs(("potrf", "potrs"), (np.zeros((0, 0)),))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -192,14 +193,14 @@ def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
 
 def _cholesky(A: np.ndarray) -> np.ndarray:
     """The factor of a small matrix, of which SciPy's own functions ask for longer than it takes."""
-    factor, failed = dpotrf(A, lower=0, clean=0)
+    factor, failed = _potrf(A, lower=0, clean=0)
     if failed:
         raise np.linalg.LinAlgError("the moments of the wiring are not positive definite")
     return factor
 
 
 def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
-    return dpotrs(factor, right, lower=0)[0]
+    return _potrs(factor, right, lower=0)[0]
 
 
 def inertia_columns(robot: Robot, rows: WiringRows, kept: list[int]) -> np.ndarray:
