@@ -12,8 +12,8 @@ from dynident.recording import Recording
 from dynident.robot import Robot
 from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.zeros import ZerosGuess, guess_zeros
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows
 from synthetic import smooth_motion
 
 TX40 = Path(__file__).parents[2] / "problems" / "staubli_tx40" / "tx40.urdf"

@@ -9,9 +9,9 @@ import pytest
 
 import dynident as di
 from chains import chain
-from dynident.wiring.any_gravity import AnyGravity
-from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import rows_of
+from dynident.wiring.regressions.any_gravity import AnyGravity
+from dynident.wiring.regressions.wiring_regression import WiringRegression
+from dynident.wiring.regressions.wiring_rows import rows_of
 from study_files import recording, true_model
 from synthetic import smooth_motion
 

@@ -44,7 +44,18 @@ class PivotedColumns:
 
     @classmethod
     def of(cls, X: Array, tolerance: float, borne: ArrayLike) -> PivotedColumns:
-        """As `base_parameters` describes it."""
+        """Normalise and factorise the columns of a regressor.
+
+        Parameters
+        ----------
+        X : (m, p)
+        tolerance : of the largest diagonal entry, below which a column depends on others.
+        borne : (p,) norm of a column where the axis bears its parameter in full; 0 where unknown.
+
+        Returns
+        -------
+        The factors, of columns of about unit norm.
+        """
         scale = np.linalg.norm(X, axis=0)
         scale[scale <= _ZERO * np.max(scale, initial=0.0)] = 0.0
         full_norm = np.maximum(scale, borne)

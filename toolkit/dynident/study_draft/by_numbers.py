@@ -17,8 +17,8 @@ from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
 from dynident.study_draft.places import Places
 from dynident.study_draft.timing import clock_scale, is_clock
-from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import WiringRows, rows_of
+from dynident.wiring.regressions.wiring_regression import WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows, rows_of
 
 UNUSED = "-"
 _SAMPLES = 6000  # of a file that are looked at

@@ -10,8 +10,8 @@ import numpy as np
 from dynident.criteria import WiringCriteria
 from dynident.model import Model
 from dynident.wiring.assignment import Assignment, Hypothesis
-from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _ABOUT = 2.5
 """Factor within which an inertia is about the described one: a rotor may weigh as much again, and

@@ -12,7 +12,7 @@ from dynident.tables import percent
 from dynident.wiring.assignment import DEGREE, Assignment, Hypothesis
 from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.hypothesis_search import Accepted, SearchResult
-from dynident.wiring.wiring_regression import TorqueFit
+from dynident.wiring.regressions.wiring_regression import TorqueFit
 
 IN_COLUMNS = "Write in [columns] of the study, in place of lines for the same columns"
 _OF_SCREWS = (

@@ -8,8 +8,8 @@ from dynident.criteria import WiringCriteria
 from dynident.model import Model
 from dynident.wiring.assignment import Assignment, Hypothesis
 from dynident.wiring.fault import FaultKind
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _ROWS = 160  # for a look at many ratios
 _COARSE = tuple(float(x) for x in np.geomspace(3.0, 1200.0, 18))

@@ -15,8 +15,8 @@ from dynident.wiring.assignment import (
 )
 from dynident.wiring.described_torque import moves_as_described
 from dynident.wiring.gear_ratios import torque_scale_hypotheses, turns_too_far
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _SMALLER = ("degrees", "millimetres", "motor_side")

@@ -17,8 +17,8 @@ from dynident.wiring.assignment import Assignment, Hypothesis
 from dynident.wiring.described_torque import DescribedScale, far_from_described
 from dynident.wiring.gear_ratios import motor_side_hypotheses, turns_too_far
 from dynident.wiring.hypothesis_fits import HypothesisFits
-from dynident.wiring.wiring_regression import TorqueFit
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _NO_MORE = 1.01  # of the torque that a mend leaves, over what is left without: rounding
 _OF_SIZE = ("torque_scale", "motor_side")

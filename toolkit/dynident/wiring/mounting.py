@@ -21,13 +21,13 @@ from dynident.effects.bodies.turn import turn_about
 from dynident.model import Model
 from dynident.robot import Robot
 from dynident.robot.tree import GRAVITY, Joint
-from dynident.wiring.any_gravity import AnyGravity
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault import Fault
 from dynident.wiring.fault_words import residuals
 from dynident.wiring.hypothesis_search import mends
-from dynident.wiring.wiring_regression import TorqueFit
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.any_gravity import AnyGravity
+from dynident.wiring.regressions.wiring_regression import TorqueFit
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _AXES = tuple(sign * axis for axis in np.eye(3) for sign in (1.0, -1.0))
 _AROUND = tuple(

@@ -20,10 +20,10 @@ from dynident.wiring.gear_ratios import turns_too_far
 from dynident.wiring.hypothesis_search import SearchResult, is_better_by_far, search
 from dynident.wiring.mounting import mounting
 from dynident.wiring.position_filter import unsuitable_position_filter
+from dynident.wiring.regressions.wiring_regression import WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows, rows_of
 from dynident.wiring.same_data import shared_recordings, twice_recorded
 from dynident.wiring.stated_period import wrong_periods
-from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 _SMALL_UNITS: dict[str, tuple[FaultKind, str, float, str]] = {
     "revolute": ("degrees", "degrees", DEGREE, "gear"),

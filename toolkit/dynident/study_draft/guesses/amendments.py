@@ -25,8 +25,8 @@ from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.mounting import mounting
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _ROUNDS = 4
 _ALIKE = 1.02  # times the least misfit, within which amendments are not told apart

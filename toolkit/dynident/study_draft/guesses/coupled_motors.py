@@ -21,8 +21,8 @@ from dynident.errors import DynidentError
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
+from dynident.wiring.regressions.wiring_rows import WiringRows, rows_of
 from dynident.wiring.speed_limits import WITHIN, over_speed, speed_reached
-from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 _BLOCKS, _FOLDS = 16, 4  # of time; every fourth is held out
 _ROUNDS = 3  # of weighting joints by what is left at them

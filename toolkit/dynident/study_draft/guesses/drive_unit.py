@@ -12,7 +12,7 @@ from dynident.errors import DynidentError
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
 from dynident.tables import number
-from dynident.wiring.wiring_rows import rows_of
+from dynident.wiring.regressions.wiring_rows import rows_of
 
 _SHOWN = 0.5
 """Share of what friction leaves that the described torque has to explain, for a size to count."""

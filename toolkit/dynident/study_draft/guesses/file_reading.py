@@ -11,7 +11,7 @@ from dynident.criteria import DEFAULTS
 from dynident.errors import DynidentError
 from dynident.recording import Column, Dataset, Recording
 from dynident.robot import Robot
-from dynident.wiring.wiring_rows import WiringRows, rows_of
+from dynident.wiring.regressions.wiring_rows import WiringRows, rows_of
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -8,7 +8,7 @@ from dynident.criteria import DEFAULTS
 from dynident.model import Model
 from dynident.recording import Recording
 from dynident.study_draft.guesses.file_reading import Reading
-from dynident.wiring.wiring_regression import WiringRegression
+from dynident.wiring.regressions.wiring_regression import WiringRegression
 
 _DELAYS = (1, 2, 4)  # samples
 

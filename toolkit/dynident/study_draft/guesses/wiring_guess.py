@@ -15,7 +15,7 @@ from dynident.study_draft.guesses.file_reading import Reading
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault_words import faults_of
 from dynident.wiring.hypothesis_search import search
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 _OF_GAINS = ("torque_sign", "torque_signs", "torque_unit", "torque_scale", "motor_side_torque")
 """Faults that a gain of the drive makes up for."""

@@ -11,8 +11,8 @@ import numpy as np
 from dynident.criteria import DEFAULTS
 from dynident.robot import Robot
 from dynident.tables import percent
-from dynident.wiring.wiring_regression import TorqueFit
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import TorqueFit
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 QUARTER = np.pi / 2
 _WIDTH = 0.05  # rad/s or m/s, over which dry friction reverses

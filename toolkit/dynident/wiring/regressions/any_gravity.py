@@ -13,8 +13,8 @@ import numpy as np
 from dynident.model import Model
 from dynident.robot import Robot
 from dynident.robot.base_parameters import structural_motion, structurally_independent
-from dynident.wiring.wiring_regression import WiringRegression, inertia_columns
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_regression import WiringRegression, inertia_columns
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from scipy.linalg import get_lapack_funcs
 
 from dynident.model import Model
 from dynident.robot import Robot
-from dynident.wiring.wiring_rows import WiringRows
+from dynident.wiring.regressions.wiring_rows import WiringRows
 
 OF_A_JOINT = 5
 """Columns of a joint's own: Fv, Fc, rotor inertia, spring, offset."""
@@ -110,6 +110,10 @@ class WiringRegression:
         inertia : (n, r) as of `inertia_columns`.
         model : of which the width of friction counts.
         rows : the motion and the torques.
+
+        Returns
+        -------
+        Their second moments.
         """
         columns = _columns(rigid, model, rows)
         n = columns.shape[1]
