@@ -208,13 +208,17 @@ def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def inertia_columns(robot: Robot, rows: WiringRows, kept: list[int]) -> np.ndarray:
-    """Mean inertia at each joint, (n, r): the torque of a unit of acceleration, gravity off.
+    """Return the mean inertia at each joint: the torque of a unit of acceleration, gravity off.
 
     Parameters
     ----------
     robot : whose bodies' parameters it is linear in.
     rows : positions at some of which it is looked at.
     kept : numbers of the r parameters.
+
+    Returns
+    -------
+    (n, r)
     """
     n = robot.n
     at = np.linspace(0, len(rows.q) - 1, min(_STATES, len(rows.q))).round().astype(int)
