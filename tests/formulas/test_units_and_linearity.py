@@ -56,6 +56,7 @@ def test_units_at_a_prismatic_joint() -> None:
     [
         ("c*sin(v)", "rad/s"),
         ("c*(q + v)", "adds rad and rad/s"),
+        ("c*v + c*v*q", "adds the unit of c times rad/s and the unit of c times rad.2/s"),
         ("c*exp(q)", "a pure number"),
         ("c*tanh(load)", "N m"),
         ("c*sign(q)", "not of a speed"),

@@ -200,10 +200,12 @@ class _Equations:
         self._rows.append((left.plus(right, -1.0), what))
 
     def _words(self, one: _Exponents) -> str:
-        names = [n for n in one.unknown if not n.startswith("#")]
-        if names:
-            return f"the unit of {' and '.join(names)}"
-        return str(Unit(tuple(one.known.tolist()))) if not one.unknown else "a number"
+        known = Unit(tuple(one.known.tolist()))
+        named = [_power(n, e) for n, e in one.unknown.items() if not n.startswith("#")]
+        if not named:
+            return "a number" if one.unknown else str(known)
+        words = f"the unit of {' '.join(named)}"
+        return words if known == NONE else f"{words} times {known}"
 
 
 _REMEDY = "divide by a parameter, or a number with a decimal point, that has the missing unit"
