@@ -45,6 +45,10 @@ def test_study_files(run, tmp_path):
     refused(run, tmp_path, r"none.toml: no such file", "simulate", "none.toml", "--out", "x")
     meant = r"binry.toml: no such file. did you mean 'binary.toml'\?"
     refused(run, tmp_path, meant, "explain", "binry.toml")
+    (tmp_path / "gone.toml").symlink_to("nowhere.toml")
+    (tmp_path / "folder.toml").mkdir()
+    for name in ("gone.toml", "folder.tom"):
+        refused(run, tmp_path, rf"{name}: no such file. check the path", "explain", name)
 
 
 # --- recordings ---------------------------------------------------------------------------------

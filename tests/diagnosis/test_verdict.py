@@ -9,6 +9,7 @@ import pytest
 
 from brief_search import BRIEF
 from dynident import diagnose as find
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.evidence import compare_models
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
@@ -38,13 +39,15 @@ def with_contact(recording: Recording, size: float) -> Recording:
     return recording.replace(tau=tau)
 
 
-@pytest.mark.parametrize("size", [1.0, 4.0])
+@pytest.mark.parametrize(("size", "criteria"), [(1.0, BRIEF), (4.0, DEFAULTS)])
 @pytest.mark.slow
-def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size: float) -> None:
+def test_a_short_disturbance_that_returns_is_not_called_noise(
+    model: Model, size: float, criteria: Criteria
+) -> None:
     """However short: it is in every period, and no noise is."""
     runs = tuple(with_contact(one, size) for one in recordings(model))
     train, test = Dataset(runs[:3]), Dataset(runs[3:])
-    found = find(model, train, test, propose="never", criteria=BRIEF)
+    found = find(model, train, test, propose="never", criteria=criteria)
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
 

@@ -14,7 +14,10 @@ def client() -> Iterator:
     No longer than a file: with nothing to do it takes a twelfth of a processor all the same.
     """
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    dask = pytest.importorskip("dask")
     with (
+        # What kills a process is not given to the next one, which would kill that, too.
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
         ) as cluster,

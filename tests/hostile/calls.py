@@ -143,7 +143,7 @@ CALLS: dict[str, str] = {
     "di.diagnose(fit, train, propose='maybe')": "DiagnosisTask: propose = 'maybe'. give",
     "di.diagnose(fit, train, progress=True)": "diagnose: progress = True. give a function or None",
     "di.design(robot, train)": "design: model is a Robot. give a Model",
-    "di.design(model, recording, short)": ANSWER,
+    "di.design(model, recording)": ANSWER,
     "di.design(model, train, 'friction')": "design: task = 'friction'. give a DesignTask or None",
     "di.design(model, train, limits=3.0)": "design: limits = 3.0. give a MotionLimits or None",
     "di.validate(fit, test, 'pd')": "validate: controller = 'pd'. give a Controller",
@@ -164,7 +164,6 @@ def _names() -> dict[str, Any]:
     import numpy as np
 
     import dynident as di
-    from dynident.experiment_design import DesignTask
 
     with TemporaryDirectory(prefix="calls.") as name:
         study = di.load(write_study(Path(name)))
@@ -180,7 +179,6 @@ def _names() -> dict[str, Any]:
         "test": study.test,
         "recording": study.train.recordings[0],
         "fit": fit,
-        "short": DesignTask(harmonics=2, starts=1),
     }
 
 

@@ -132,7 +132,7 @@ WRITERS = {
     "open": Writer(words=("open", "study.toml", "--no-browser"), results={"study.toml": di.load}),
 }
 
-ALIKE = {"explain --design": "design", "demo --design": "experiment"}
+ALIKE = {"explain --design": "design"}
 """Options that write with the code of another writer, and take long to get there."""
 IN_PLACE = ("add study", "open study")
 """Arguments that are written to as well as read."""
@@ -153,7 +153,7 @@ LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"}
 MARKED = [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS]
 each_writer = pytest.mark.parametrize("name", MARKED)
 WITH_CODE_OF_THEIR_OWN = [one for one in MARKED if one.values[0] != "demo of a design"]
-"""Less what begins to write as another does, see `ALIKE`."""
+"""Less `demo --design`, which begins to write as `simulate` does, with the experiment."""
 
 
 def prepare(folder: Path) -> None:

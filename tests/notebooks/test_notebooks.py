@@ -57,6 +57,7 @@ def fonts(tmp_path: Path) -> Path:
 def test_there_are_notebooks() -> None:
     assert NOTEBOOKS
     assert all(re.fullmatch(r"\d\d_[a-z0-9_]+", path.stem) for path in NOTEBOOKS)
+    assert OF_NOTEBOOKS.keys() <= {path.stem for path in NOTEBOOKS}
 
 
 @each_of([path for path in NOTEBOOKS if path != IN_JUPYTER])

@@ -219,15 +219,16 @@ def test_pictures_are_lower_on_paper_and_as_before_afterwards(visit, two_joints)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
-def test_who_cannot_see_or_point_can_read_it(which, visit, request):
-    """With all that is folded open, less joints like others. Last: it leaves the page so."""
-    one = visit(request.getfixturevalue(which), DESK)
+def test_who_cannot_see_or_point_can_read_it(which, browser, request):
+    """With all that is folded open, less joints like others: of a page of its own."""
+    one = _visited(browser, request.getfixturevalue(which), DESK)
     one.page.evaluate(_UNFOLD)
     assert serious_faults(one.page) == []
     levels = one.page.evaluate(
         "[...document.querySelectorAll('h1,h2,h3,h4')].map((n) => Number(n.tagName[1]))"
     )
     assert levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))
+    one.page.context.close()
 
 
 def test_the_page_of_a_validation(visit, tmp_path):

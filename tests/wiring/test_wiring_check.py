@@ -187,7 +187,7 @@ def test_the_line_mends_it_when_typed(fault: Injected, mapped: str, tmp_path: Pa
     study = di.load(path)
     if fault.ratio is not None:  # which the mend has about
         assert check_wiring(study.model, study.train, study.test) == ()
-    else:  # that of the files without a fault, which a period that is mended is left with
+    else:  # that of the files without a fault, of which nothing is said when a period is mended
         for made, own in zip(
             (*study.train.recordings, *study.test.recordings), (0, 1), strict=True
         ):

@@ -106,7 +106,7 @@ class _Call:
         return typing.get_type_hints(self._function, localns=scope)
 
     @cached_property
-    def _words(self) -> dict[str, tuple[Any, ...]]:
+    def _admitted(self) -> dict[str, tuple[Any, ...]]:
         """Words that are admitted, by the name of the argument, of those that want words."""
         return {name: words for name, hint in self._hints.items() if (words := _words(hint))}
 
@@ -127,7 +127,7 @@ class _Call:
 
     def check_words(self, given: dict[str, Any]) -> None:
         """Refuse words that are not among those of their annotation."""
-        for name, words in self._words.items():
+        for name, words in self._admitted.items():
             value = given.get(name)
             if isinstance(value, str) and value not in words:
                 remedy = f"give {_wanted(self._hints[name])}"

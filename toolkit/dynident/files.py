@@ -58,7 +58,7 @@ def _remedy(path: Path) -> str:
     """Which file of the same folder may have been meant instead of one that is not there."""
     try:
         with os.scandir(path.parent) as entries:
-            names = [one.name for one in itertools.islice(entries, _LOOKED_AT)]
+            names = [one.name for one in itertools.islice(entries, _LOOKED_AT) if one.is_file()]
     except OSError:
         return "check the path"
     meant = close_word(path.name, names, 0.8)

@@ -49,7 +49,7 @@ def rms(values: np.ndarray, trials: Trials) -> np.ndarray:
     return np.sqrt(np.mean(((values - trials.truth)[:, trials.inertial]) ** 2, axis=0))
 
 
-# One test, so that no two workers make the trials.
+# One test of all that the trials show: they take most of its time.
 @pytest.mark.slow
 def test_errors_are_a_tenth_of_those_of_least_squares_and_intervals_cover_what_they_say():
     """Where no noise is stated it is measured: a little too much, for the loop reacts to it."""

@@ -109,7 +109,8 @@ class DesignQuestion:
         bare = model
         for one in (*told, *shown):
             bare = bare - one.label if one in bare else bare
-        estimates, whole = {} if estimates is None else estimates, bare + told[:1] if told else bare
+        whole = bare + told[:1] if told else bare
+        estimates = {} if estimates is None else estimates
         estimate = estimates.get(whole.effects)
         if estimate is None:
             estimate = estimates[whole.effects] = fit(whole, recorded)

@@ -68,6 +68,7 @@ class LeastSquares:
         estimate, solution = self.without_bias(model, dataset)
         return estimate if self.errors == "independent" else with_bias(estimate, dataset, solution)
 
+    @single_threaded
     def without_bias(self, model: Model, dataset: Dataset) -> tuple[Estimate, LinearSolution]:
         """As `fit`, before the bias that noise of the positions leaves is in sigma.
 

@@ -308,7 +308,9 @@ def _passed_noise(rate_hz: float, cutoff_hz: float | None) -> np.ndarray:
         found.append(
             [k * np.trapezoid(np.where(k * _TURN <= np.pi, gain, 0.0), _TURN) for k in _EVERY]
         )
-    return np.array(found)
+    passing = np.array(found)
+    passing.flags.writeable = False  # it is kept
+    return passing
 
 
 def _noise(q: np.ndarray, every: Sequence[int]) -> np.ndarray:

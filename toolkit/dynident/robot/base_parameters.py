@@ -199,7 +199,7 @@ def base_parameters(
         column = int(np.argmin(np.all(np.isfinite(X), axis=0)))
         raise FitError("the regressor is not finite", f"column '{names[column]}'")
     found = PivotedColumns.of(X, tolerance, borne)
-    scale, near, shown, norms = found.scale, found.near, found.shown, found.norms
+    scale, near, shown, norms = found.scale, found.near.copy(), found.shown, found.norms
     R, pivots, diagonal, rank = found.R, found.pivots, found.diagonal, found.rank
     # In unit columns first: there a coefficient can be compared with 1.
     unit = solve_triangular(R[:rank, :rank], R[:rank, rank:]) if rank else np.zeros((0, len(shown)))

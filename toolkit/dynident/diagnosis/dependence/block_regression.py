@@ -136,6 +136,8 @@ def left_of_each_unit(
     (product,) = get_blas_funcs(("symv",), (inverse,))
     (solved,) = get_lapack_funcs(("posv",), (inverse,))
     weights, left = product(1.0, inverse, residual, lower=1), np.empty_like(residual)
+    if not np.all(np.isfinite(weights)):
+        raise FitError("a kernel regression on the residual is not finite")
     for unit in units:
         out = unit.left_out
         # Thousands of small systems: checks of their numbers would take longer than they do.

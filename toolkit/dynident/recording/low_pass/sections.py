@@ -78,7 +78,7 @@ def slowest_pole(sections: np.ndarray) -> float:
     ----------
     sections : (s, 6)
     """
-    return _slowest_of(sections[:, 3:].tobytes())
+    return _slowest_of(np.asarray(sections[:, 3:], dtype=float).tobytes())
 
 
 @lru_cache(64)

@@ -196,9 +196,9 @@ def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
 
 
 def _cholesky(A: np.ndarray) -> np.ndarray:
-    """The factor of a small matrix, of which SciPy's own functions ask for longer than it takes."""
+    """The factor of a matrix so small that SciPy's own functions would take longer than it does."""
     factor, failed = _potrf(A, lower=0, clean=0)
-    if failed:
+    if failed or not np.isfinite(factor[-1:, -1:]).all():  # LAPACK lets what is not finite pass
         raise np.linalg.LinAlgError("the moments of the wiring are not positive definite")
     return factor
 
