@@ -1,6 +1,6 @@
 """Designed motions against random ones within the same limits.
 
-    python benchmarks/designed_motions.py --random 1000 --starts 2
+    python benchmarks/designed_motions.py --random 1000
 
 For arms of two, ten and seven joints, or the problems that `--arms` names: the geometric mean of
 the standard deviations of all parameters with the designed motion over that with the best, and with
@@ -157,7 +157,7 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--random", type=int, default=1000, help="random motions")
-    parser.add_argument("--starts", type=int, default=2)
+    parser.add_argument("--starts", type=int, default=DesignTask.starts)
     parser.add_argument("--seeds", type=int, default=1, help="designs of each arm")
     parser.add_argument("--arms", nargs="*", default=ARMS)
     parser.add_argument("--condition", type=int, default=0, help="evaluations")

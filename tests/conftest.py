@@ -46,14 +46,3 @@ def browser(tmp_path_factory) -> Iterator:
         )
         yield found
         found.close()
-
-
-@pytest.fixture
-def few_begins(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Begin the search for a motion at the best of few random ones, for what holds for any begin.
-
-    Most of the time of a small design goes into trying many.
-    """
-    from dynident.experiment_design import motion_program
-
-    monkeypatch.setattr(motion_program, "_TRIED", 15)

@@ -117,9 +117,7 @@ def test_a_joint_without_range_is_one_line(run, tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_the_loop_is_closed_without_a_hand_in_between(
-    run, tmp_path, monkeypatch, few_begins
-) -> None:
+def test_the_loop_is_closed_without_a_hand_in_between(run, tmp_path, monkeypatch) -> None:
     done = run("demo", "--design", "made", "--json")
     assert done.status == 0, done.err
     said = json.loads(done.out)

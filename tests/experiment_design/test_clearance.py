@@ -45,7 +45,6 @@ def test_distances_are_those_of_the_shapes(robot: Robot) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_designed_motions_stay_clear_between_the_instants_that_were_looked_at(robot: Robot) -> None:
     model, data = recorded(robot)
     task = DesignTask(duration=6.0, repeat=1, harmonics=4, starts=1)

@@ -12,11 +12,10 @@ import pytest
 from chains import chain
 from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
-from dynident.experiment_design import DesignTask, MotionLimits, design, motion_program
+from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
-from dynident.experiment_design.motion_solver import MotionSolver
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.telling.separation import DECIDES
@@ -91,8 +90,6 @@ def test_columns_are_those_of_the_model(label: str) -> None:
 
 
 def test_the_symbolic_loss_is_the_loss() -> None:
-    import casadi
-
     columns = ColumnFunction.of(MODEL, true_values(MODEL))
     count, some = columns.count, motions()
     rng = np.random.default_rng(0)
@@ -111,14 +108,11 @@ def test_the_symbolic_loss_is_the_loss() -> None:
         t = some.times(40)
         q, v, a = some.trajectory(some.random(1) * 0.2).at(t)
         instants = np.hstack([q, v, a, t[:, None]]).T
-        given = casadi.MX.sym("instants", *instants.shape)
-        function = casadi.Function("loss", [given], [information.symbolic_loss(given)])
-        symbolic = float(function(instants))
+        symbolic, _ = information.loss_function(len(t))(instants)
         plain = information.loss(information.matrix(t, (q, v, a)))
-        assert symbolic == pytest.approx(plain, rel=1e-6)
+        assert float(symbolic) == pytest.approx(plain, rel=1e-6)
 
 
-@pytest.mark.usefixtures("few_begins")
 def test_predicted_sigma_is_that_of_the_regression() -> None:
     task = DesignTask(duration=8.0, repeat=2, harmonics=4, starts=1)
     found = design(MODEL, recorded(), task)
@@ -135,7 +129,6 @@ def test_predicted_sigma_is_that_of_the_regression() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
     task = DesignTask(duration=10.0, repeat=1, harmonics=5, starts=2)
     found = design(MODEL, recorded(), task)
@@ -188,7 +181,6 @@ def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: fl
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_of_several_pairs_the_one_told_least_counts() -> None:
     base = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
     labels = (
@@ -237,7 +229,6 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_several_effects_are_shown_together() -> None:
     effects = tuple(effects_of(one, ROBOT)[0] for one in ("torque_offset@shoulder", "base_tilt"))
     found = design(MODEL, recorded(), DesignTask(show=effects, starts=1, harmonics=4))
@@ -248,7 +239,6 @@ def test_several_effects_are_shown_together() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_parameters_of_a_joint_alone_are_told_better_than_beside_all_others() -> None:
     task = DesignTask(repeat=1, harmonics=3, starts=1)
     every = design(MODEL, recorded(), task)
@@ -272,7 +262,6 @@ def test_joints_that_are_misspelt_are_refused_by_name() -> None:
 @pytest.mark.parametrize(
     "seed", [pytest.param(k, marks=pytest.mark.slow if k > 1 else ()) for k in range(12)]
 )
-@pytest.mark.usefixtures("few_begins")
 def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
     robot = chain(1 + seed % 4, seed)
     rng = np.random.default_rng(seed)
@@ -302,7 +291,6 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [{"harmonics": 4}, {"intervals": 8}])
-@pytest.mark.usefixtures("few_begins")
 def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, Any], tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text("[joints.shoulder]\njerk = 12.0\n")
@@ -321,7 +309,6 @@ def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, Any], tmp_path: Path) 
     assert "jerk" in str(held.limit_table()) and "jerk" not in str(free.limit_table())
 
 
-@pytest.mark.usefixtures("few_begins")
 def test_torque_limits_hold() -> None:
     plain = MotionLimits.of(ROBOT)
     limits = replace(plain, torque=np.array([45.0, 12.0]))
@@ -333,31 +320,6 @@ def test_torque_limits_hold() -> None:
     assert np.abs(torque).max() > 10.0
 
 
-def written(monkeypatch: pytest.MonkeyPatch) -> list[frozenset[int]]:
-    """Joints whose torques are limited in each program that is written from now on."""
-    found, of = [], MotionSolver.of
-
-    def noted(motions, informations, instants, iterations, torque, cuts=()):
-        found.append(frozenset(torque.joints))
-        return of(motions, informations, instants, iterations, torque, cuts)
-
-    monkeypatch.setattr(MotionSolver, "of", noted)
-    return found
-
-
-@pytest.mark.usefixtures("few_begins")
-def test_torques_far_from_their_limits_cost_a_large_search_no_rows(monkeypatch) -> None:
-    programs = written(monkeypatch)
-    limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e3, 1e3]))
-    design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
-    assert programs == [frozenset({0, 1})]
-    programs.clear()
-    monkeypatch.setattr(motion_program, "_FEW", 0)
-    design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
-    assert programs == [frozenset()]
-
-
-@pytest.mark.usefixtures("few_begins")
 def test_torques_that_turn_out_too_large_are_limited_then() -> None:
     task, free = (
         DesignTask(starts=1, harmonics=2),
@@ -370,19 +332,16 @@ def test_torques_that_turn_out_too_large_are_limited_then() -> None:
         motion = found.program.motions.trajectory(variables).at(t)
         return float(np.abs(found.program.torque.along(t, *motion)[:, 1]).max())
 
-    limits = replace(free, torque=np.array([np.inf, 0.97 * elbow(found.motion.variables)]))
+    limits = replace(free, torque=np.array([np.inf, 0.8 * elbow(found.motion.variables)]))
     program = replace(found.program, motions=replace(found.program.motions, limits=limits))
-    lazy = program.lazily(program.informations, program.instants, 60, ())
     # The motion without limits, only made smaller, is within them, and tells less.
     smaller = program.within(found.motion.variables)
     assert smaller is not None
-    (ended,) = program.ends(lazy, smaller)
-    assert lazy.torque.joints == {1}
+    (ended,) = program.ends(program.solver(), smaller)
     assert elbow(ended.variables) <= limits.torque[1]
-    assert ended.loss < program.loss(smaller)
+    assert ended.loss < program.loss(smaller) - 0.05
 
 
-@pytest.mark.usefixtures("few_begins")
 def test_the_next_recording_complements_those_so_far() -> None:
     """What is known already counts: without it the sigmas are larger."""
     task = DesignTask(duration=8.0, repeat=1, harmonics=3, starts=1)
@@ -434,7 +393,6 @@ def test_limits_by_file(tmp_path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_what_no_motion_tells_is_infinite_and_named() -> None:
     """Beside viscous friction the law c v has no sigma; rivals that are the same are not told."""
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)

@@ -1,6 +1,9 @@
-"""The program that Ipopt is given: its slopes are those of its rows."""
+"""The search that SLSQP is given: its rows are the limits, and its slopes are those of its rows."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from dynident.experiment_design import MotionLimits
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
-from dynident.experiment_design.motion_solver import LimitedTorque, MotionSolver
+from dynident.experiment_design.motion_solver import MotionSolver, torque_shares
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
@@ -21,71 +24,93 @@ from synthetic import true_values
 ROBOT = Robot.from_text("prismatic".join(chain_text(3).rsplit("revolute", 1)))
 """Three joints, the last of which slides."""
 MODEL = Model(ROBOT) + "viscous_friction"
-LIMITS = MotionLimits.of(ROBOT)
+COLUMNS = ColumnFunction.of(MODEL, true_values(MODEL))
+LIMITS = replace(MotionLimits.of(ROBOT), jerk=np.array([np.inf, 30.0, np.inf]))
 FAMILIES: tuple[MotionFamily, ...] = (
     FourierMotions(limits=LIMITS, period=4.0, harmonics=3),
     SplineMotions(limits=LIMITS, period=4.0, intervals=8),
 )
-CUTS = (RoomCut(1.3, np.array([0.2, -0.5, 0.1]), -0.4),)
-
-
-MOST = np.array([3.0, 20.0, 7.0])
+CUTS = [RoomCut(1.3, np.array([0.2, -0.5, 0.1]), -0.4)]
+PEAKS = [(0.5, 1), (0.5, 2), (3.1, 0)]
+MOST = np.array([3.0, 20.0, np.inf])
 """N m, N m, N."""
 
-
-def limited_torque(columns: ColumnFunction, joints: tuple[int, ...]) -> LimitedTorque:
-    return LimitedTorque(function=columns.torque, most=MOST, joints=joints)
+all_families = pytest.mark.parametrize("family", FAMILIES, ids=lambda one: type(one).__name__)
 
 
-def information(columns: ColumnFunction, last: int) -> Information:
+def information(last: int) -> Information:
     return Information(
-        columns=columns,
-        mix=np.eye(columns.count),
+        columns=COLUMNS,
+        mix=np.eye(COLUMNS.count),
         last=last,
         weight=np.array([2.0, 5.0, 1.0]),
-        prior=np.eye(columns.count),
-        scale=np.ones(columns.count),
+        prior=np.eye(COLUMNS.count),
+        scale=np.ones(COLUMNS.count),
     )
 
 
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda one: type(one).__name__)
-@pytest.mark.parametrize("limited", [(), (1,), (0, 1, 2)])
-@pytest.mark.parametrize("asked", [1, 3])
-def test_slopes_are_those_of_the_rows(
-    family: MotionFamily, limited: tuple[int, ...], asked: int
-) -> None:
-    columns = ColumnFunction.of(MODEL, true_values(MODEL))
-    torque = limited_torque(columns, limited)
-    every = tuple(information(columns, k + 1) for k in range(asked))
-    solver = MotionSolver.of(family, every, (25, 12), 10, torque, CUTS)
-    rows = solver.function.get_function("nlp_g")
-    x = np.append((0.2 * family.random(5)).ravel(), [0.3] * (asked > 1))
-    values, slopes = (np.array(one) for one in solver.function.get_function("nlp_jac_g")(x, []))
-    np.testing.assert_allclose(values, np.array(rows(x, [])), atol=1e-12)
-    step = 1e-6
-    ways = step * np.eye(len(x))
-    plain = np.hstack(
-        [(np.array(rows(x + way, [])) - np.array(rows(x - way, []))) / (2 * step) for way in ways]
-    )
-    np.testing.assert_allclose(slopes, plain, atol=1e-6 * np.abs(plain).max())
-    objective, slope = solver.function.get_function("nlp_grad_f")(x, [])
-    losses = solver.function.get_function("nlp_f")
-    assert float(objective) == pytest.approx(float(losses(x, [])))
-    along = [(float(losses(x + w, [])) - float(losses(x - w, []))) / (2 * step) for w in ways]
-    np.testing.assert_allclose(np.array(slope).ravel(), along, atol=1e-6 * np.abs(along).max())
+def solver_of(family: MotionFamily, asked: int = 1) -> MotionSolver:
+    every = tuple(information(k + 1) for k in range(asked))
+    return MotionSolver.of(family, every, (25, 12), 60, torque_shares(COLUMNS.torque, MOST))
 
 
-def test_torques_are_limited_as_shares_of_what_they_may_be() -> None:
-    (family, _), columns = FAMILIES, ColumnFunction.of(MODEL, true_values(MODEL))
-    solvers = [
-        MotionSolver.of(family, (information(columns, 2),), (25, 12), 10, torque)
-        for torque in (limited_torque(columns, joints) for joints in ((), (0, 2)))
-    ]
-    variables = 0.2 * family.random(2)
-    without, limited = (
-        np.array(one.function.get_function("nlp_g")(variables.ravel(), [])).ravel()
-        for one in solvers
-    )
-    t = family.times(12)
-    torque = columns.torque_along(t, *family.trajectory(variables).at(t))[:, [0, 2]] / MOST[[0, 2]]
-    np.testing.assert_allclose(limited[len(without) :], torque.T.ravel(), atol=1e-12)
+def differences(function: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> np.ndarray:
+    """Slopes of a function of variables, (r, u)."""
+    ways = 1e-6 * np.eye(at.size).reshape(-1, *at.shape)
+    return np.column_stack([(function(at + way) - function(at - way)) / 2e-6 for way in ways])
+
+
+@all_families
+def test_slopes_are_those_of_the_values(family: MotionFamily) -> None:
+    solver, x = solver_of(family, 3).limiting(PEAKS), 0.2 * family.random(5)
+    assert solver.torque is not None
+    for rows in (solver.found_losses, solver.torque.rows):
+        plain = differences(lambda at, rows=rows: rows(at).values, x)
+        np.testing.assert_allclose(rows(x).slopes, plain, atol=1e-6 * np.abs(plain).max())
+
+
+@all_families
+def test_linear_rows_leave_what_the_limits_leave(family: MotionFamily) -> None:
+    solver, x, t = solver_of(family), 0.1 * family.random(3), family.times(12)
+    q, v, a = family.trajectory(x).at(t)
+    half = (LIMITS.upper - LIMITS.lower) / 2
+    jerk = family.jerk(x, family.to_the_end(12))[:, 1] / LIMITS.jerk[1]
+    shares = [(q - LIMITS.lower) / half - 1.0, v / LIMITS.speed, a / LIMITS.acceleration]
+    whole = np.concatenate([*(one.T.ravel() for one in shares), jerk])
+    left, found = np.concatenate([1 - whole, 1 + whole]), solver.linear.at(x.ravel())
+    # Rows that no variable moves, as of the speed where a motion begins, may be left out.
+    left, found = (np.sort(one[np.abs(one - 1.0) > 1e-9]) for one in (left, found))
+    np.testing.assert_allclose(found, left, atol=1e-9)
+
+
+@all_families
+def test_cuts_and_limited_torques_are_rows_at_their_instants(family: MotionFamily) -> None:
+    x = 0.1 * family.random(3)
+    solver = solver_of(family).limiting(PEAKS).cut(CUTS)
+    (cut,), motion = CUTS, family.trajectory(x)
+    left = cut.slope @ motion.at(np.array([cut.t]))[0][0] - cut.least
+    assert solver.linear.at(x.ravel())[-1] == pytest.approx(left, abs=1e-12)
+    assert solver.torque is not None
+    t, joints = (np.array(one) for one in zip(*PEAKS, strict=True))
+    share = (COLUMNS.torque_along(t, *motion.at(t)) / MOST)[np.arange(len(t)), joints]
+    expected = np.concatenate([1 - share, 1 + share])
+    np.testing.assert_allclose(solver.torque.rows(x).values, expected, atol=1e-12)
+    assert solver.limiting([]).torque is None
+
+
+@all_families
+@pytest.mark.parametrize("asked", [1, 2])
+def test_a_search_ends_lower_and_within_its_rows(family: MotionFamily, asked: int) -> None:
+    solver, start = solver_of(family, asked), 0.05 * family.random(4)
+    ended = solver.ended(start)
+    assert solver.linear.at(ended.variables.ravel()).min() > -1e-6
+    before, after = (solver.found_losses(x).values.max() for x in (start, ended.variables))
+    assert after < before - 1.0
+    torque = COLUMNS.torque_along(t := family.times(12), *family.trajectory(ended.variables).at(t))
+    most = 0.8 * np.abs(torque).max(axis=0)
+    every = [(float(one), joint) for one in t for joint in range(3)]
+    limited = replace(solver, shares=torque_shares(COLUMNS.torque, most)).limiting(every)
+    kept = limited.ended(ended.variables)
+    assert limited.torque is not None
+    assert limited.torque.rows(ended.variables).values.min() < -0.1
+    assert limited.torque.rows(kept.variables).values.min() > -1e-3

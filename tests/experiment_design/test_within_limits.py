@@ -55,7 +55,6 @@ def test_torques_are_predicted_where_small_motions_say_little(seed: int) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
-@pytest.mark.usefixtures("few_begins")
 def test_random_robots_keep_their_limits(seed: int) -> None:
     """A sample of the benchmark: by Pinocchio and Drake, on a hundred times as many instants."""
     drawn = Drawn.of(seed)

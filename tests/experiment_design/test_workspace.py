@@ -70,7 +70,6 @@ def test_places_agree_with_drake_on_an_arm_in_space() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_a_designed_motion_stays_in_its_box(robot: Robot, data: Dataset, tmp_path: Path) -> None:
     task = DesignTask(duration=6.0, repeat=1, harmonics=4, starts=1)
     t = np.linspace(0.0, 6.0, 10 * FINER * 110)

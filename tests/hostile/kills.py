@@ -24,7 +24,6 @@ from pathlib import Path
 
 from dynident import file_groups, files
 from dynident.cli import main as command
-from dynident.experiment_design import motion_program
 from dynident.explorer.effect_choices import EffectChoice
 from dynident.explorer.local_server import LocalServer
 from hostile.worker import load_libraries
@@ -79,7 +78,6 @@ def started(
         if errors is not None:
             _say_it_here()
         LocalServer.serve = _click
-        motion_program._TRIED = 10  # a design is written whatever its search began with
         before()
         command(words)
     except SystemExit as stop:

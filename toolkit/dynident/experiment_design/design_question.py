@@ -29,11 +29,9 @@ from dynident.settings import nearest
 _SIZES = 5  # random motions by which columns are scaled
 _UNSEEN = 1e-9  # of the size of the others: it makes no torque
 _RIVAL_SHAPES = 3  # of a rival, beside its own
-WIDER = (30.0, 10.0, 3.0)
-"""Widths of dry friction, over the true one, through which a narrow law is approached: with the
-true one, a motion that is a little slower or faster tells the same, and no slope leads anywhere."""
+_WIDER = 30.0  # widths of dry friction, over the true one
 _COMPARED = 200  # instants
-_NARROW = 0.05  # of a column: its change, with the first of these, that makes it narrow
+_NARROW = 0.05  # of a column: its change, with wider dry friction, that makes it narrow
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,14 +41,15 @@ class Asked:
     Attributes
     ----------
     information : of a motion.
-    softer : the same with dry friction over wider ranges of speed, the widest first; none where
-        that makes no difference to the effects that are asked for.
+    is_narrow : whether dry friction over wider ranges of speed would make a difference to the
+        effects that are asked for: many more instants tell what such a law does, and a motion that
+        is a little slower or faster tells the same, so that a search ends at many places.
     labels : of what is told, those of interest last.
     rows : of each joint that the recording will have.
     """
 
     information: Information
-    softer: tuple[Information, ...]
+    is_narrow: bool
     labels: tuple[str, ...]
     rows: float
 
@@ -172,7 +171,6 @@ class DesignQuestion:
         unladen = self._columns(extra, carries_payload=False)
         prior, rate = _recorded(unladen, mix, recorded, std)
         rows = rate * task.duration * task.repeat
-        softer = self._softer(columns, extra, motions)
         information = Information(
             columns=columns,
             mix=mix,
@@ -184,7 +182,7 @@ class DesignQuestion:
         )
         return Asked(
             information=information,
-            softer=tuple(replace(information, columns=one) for one in softer),
+            is_narrow=self._is_narrow(columns, extra, motions),
             labels=tuple(np.array(labels)[kept].tolist()),
             rows=rows,
         )
@@ -216,32 +214,20 @@ class DesignQuestion:
             found.append(rivals.moments(rows.t, (rows.q, rows.v, rows.a)))
         return reduce(add, found)
 
-    def _softer(
+    def _is_narrow(
         self, columns: ColumnFunction, extra: Sequence[Effect], motions: MotionFamily
-    ) -> list[ColumnFunction]:
-        """The columns with wider dry friction, if that changes those that are asked for."""
+    ) -> bool:
         if not self.told:
-            return []
-        found = []
+            return False
         t = motions.times(_COMPARED)
         motion = motions.trajectory(motions.random(0) * 0.3).at(t)
+        widths = tuple(_WIDER * one for one in self.bare.friction_widths)
+        wider = replace(self, bare=replace(self.bare, friction_width=widths))
+        soft = wider._columns(extra, carries_payload=self.task.load > 0)
         own = slice(self.bare.size, None)
-        sharp = columns.along(t, *motion)[:, :, own]
-        for wider in WIDER:
-            widths = tuple(wider * one for one in self.bare.friction_widths)
-            soft = ColumnFunction.of(
-                replace(self.bare, friction_width=widths),
-                self.values,
-                extra,
-                carries_payload=self.task.load > 0,
-            )
-            if not found:
-                change = soft.along(t, *motion)[:, :, own] - sharp
-                sizes = [np.linalg.norm(one, axis=(0, 1)) for one in (change, sharp)]
-                if not np.any(sizes[0] > _NARROW * sizes[1]):
-                    return []
-            found.append(soft)
-        return found
+        sharp, blunt = (one.along(t, *motion)[:, :, own] for one in (columns, soft))
+        change, size = (np.linalg.norm(one, axis=(0, 1)) for one in (blunt - sharp, sharp))
+        return bool(np.any(change > _NARROW * size))
 
     def _beside(self) -> tuple[Effect, ...]:
         """Rivals, with the other shapes that they may have, then the effect that is asked for."""

@@ -127,7 +127,7 @@ def _designed(
         informations=tuple(one.information for one in asked),
         motions=motions,
         torque=questions[0].torque,
-        softer=tuple(one.softer for one in asked),
+        narrow=any(one.is_narrow for one in asked),
         workspace=workspace,
     )
     progress("comparing with usual motions")
@@ -207,11 +207,7 @@ def _without_hopeless(program: MotionProgram, usual: list[np.ndarray]) -> Motion
         if any(_sigma(one, program.told(one, x)) > _HOPELESS for x in usual)
     ]
     kept = kept or [0]
-    return replace(
-        program,
-        informations=tuple(program.informations[k] for k in kept),
-        softer=tuple(program.softer[k] for k in kept),
-    )
+    return replace(program, informations=tuple(program.informations[k] for k in kept))
 
 
 def _require_known_torque(program: MotionProgram) -> None:

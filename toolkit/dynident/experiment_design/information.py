@@ -104,25 +104,26 @@ class Information:
             return float(np.log(np.trace(np.linalg.inv(scaled))))
         return self.unit - float(np.linalg.slogdet(scaled)[1])
 
-    def symbolic_loss(self, inputs: Any) -> Any:
-        """Return the loss of CasADi's instants.
+    def loss_function(self, instants: int) -> Any:
+        """Return the loss, of a motion and of what is recorded together, as CasADi's function.
 
         Parameters
         ----------
-        inputs : (3 n + 1, T) q, v, a and the time.
+        instants : at which the motion is given, T.
 
         Returns
         -------
-        An expression: the loss of the motion and of what is recorded together.
+        casadi.Function of q, v, a and the time, (3 n + 1, T): the loss, and its slopes by them.
         """
-        instants = inputs.shape[1]
-        x = ca.SX.sym("x", inputs.shape[0])
+        x = ca.SX.sym("x", 3 * self.columns.n + 1)
         # Mixed instant by instant: a product of large matrices costs as much as the columns do.
         mix = ca.sparsify(ca.DM(self.mix / self.scale)).T
         own = mix @ self.columns.function(x) @ ca.diag(ca.DM(np.sqrt(self.weight / instants)))
+        inputs = ca.MX.sym("inputs", 3 * self.columns.n + 1, instants)
         rows = ca.Function("told", [x], [ca.densify(own)]).map(instants)(inputs)
         prior = self.prior / np.outer(self.scale, self.scale) + RIDGE * np.eye(len(self.scale))
-        return self._factor_loss()(rows @ rows.T + ca.DM(prior))
+        loss = self._factor_loss()(rows @ rows.T + ca.DM(prior))
+        return ca.Function("loss", [inputs], [loss, ca.gradient(loss, inputs)])
 
     @property
     def unit(self) -> float:
@@ -134,6 +135,11 @@ class Information:
         if self.objective == "A":
             return 0.0
         return -2 * float(np.sum(np.log(self.scale[len(self.scale) - self.last :])))
+
+    @property
+    def terms(self) -> int:
+        """How many logarithms the loss is the sum of."""
+        return self.last if self.objective == "D" else 1
 
     def _factor_loss(self) -> Any:
         """The loss of an information matrix, (k, k)."""

@@ -1,4 +1,4 @@
-"""The motion that tells the most within limits: a nonlinear program, solved by Ipopt.
+"""The motion that tells the most within limits: a nonlinear program, solved by SLSQP.
 
 Variables are amplitudes; position, speed, acceleration and jerk are linear in them, and the torque
 is not. The limits hold on a grid of instants while the program is solved; then the motion is looked
@@ -7,7 +7,7 @@ at on ten times as many, and made smaller about its centre until none is exceede
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -15,16 +15,14 @@ from itertools import islice
 import numpy as np
 
 from dynident.errors import DesignError
-from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
+from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_solver import (
-    NOT_BETTER,
     DesignedMotion,
-    LazySolver,
-    LimitedTorque,
     MotionSolver,
     joined,
+    torque_shares,
 )
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
@@ -33,28 +31,23 @@ _PER_WAVE = 22  # instants
 _LEAST, _LEAST_NARROW = 100, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
-_TRIED = 150  # random motions for each start
-_ITERATIONS, _ITERATIONS_SOFT = 150, 60
+_TRIED = 20  # random motions for each start
+_NARROW_STARTS = 3
+"""Searches for narrow laws, over those for others: they end at many places. To go to them by way of
+wider laws leads to no better motions than as many searches from elsewhere do."""
+_ITERATIONS = 150
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _CUTS = 6  # rounds of bounds that keep a motion in the workspace
 _USUAL = 0.3  # of a random motion's size
-_NEAR = 0.5
-"""Share of a limit of torque from which on the search imposes it from the beginning."""
-_FEW = 1000
-"""Rows of torques that a program may have without its time going into them: all are imposed."""
+_NEAR = 0.7  # of a limit of torque, from which on the search imposes it from the beginning
+_ROUNDS = 6  # of limits on torques that turn out too large
 _ROUNDING = 1e-9
 
 
-def instants_of(motions: MotionFamily, *, narrow: int = 0) -> int:
-    """Return at how many instants limits are imposed, and columns evaluated.
-
-    Parameters
-    ----------
-    motions : of which one is sought.
-    narrow : how many softer forms its columns have; with any there are more instants.
-    """
-    return max(_LEAST_NARROW if narrow else _LEAST, _PER_WAVE * motions.waves)
+def instants_of(motions: MotionFamily) -> int:
+    """Return at how many instants limits are imposed on motions."""
+    return max(_LEAST, _PER_WAVE * motions.waves)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,15 +60,15 @@ class MotionProgram:
         a little.
     motions : among which it is sought.
     torque : that is limited.
-    softer : of each of these, the same with dry friction over wider ranges of speed, the widest
-        first, through which the search goes; none where that makes no difference.
+    narrow : whether a law among them acts in a narrow range of speeds: then there are more instants
+        and more searches.
     workspace : that the robot stays in.
     """
 
     informations: tuple[Information, ...]
     motions: MotionFamily
     torque: PredictedTorque
-    softer: tuple[tuple[Information, ...], ...] = ()
+    narrow: bool = False
     workspace: Workspace = field(default_factory=Workspace)
 
     @property
@@ -85,8 +78,8 @@ class MotionProgram:
 
     @property
     def instants(self) -> int:
-        """Instants at which limits are imposed and columns evaluated."""
-        return max(instants_of(self.motions, narrow=len(one)) for one in self.softer or ((),))
+        """Instants at which columns are evaluated."""
+        return max(_LEAST_NARROW if self.narrow else 0, instants_of(self.motions))
 
     @property
     def limits(self) -> MotionLimits:
@@ -209,25 +202,12 @@ class MotionProgram:
         DesignError
             If no start ends at a motion within the limits.
         """
-        begins = self._begins(starts, seed)
-        near = self._limited_at_once(begins)
-        stages = [
-            self.lazily(one, instants_of(self.motions), _ITERATIONS_SOFT, near)
-            for one in self._softened()
-        ]
-        solver = self.lazily(self.informations, self.instants, _ITERATIONS, near)
+        begins = self._begins(starts * (_NARROW_STARTS if self.narrow else 1), seed)
+        solver = self.solver()
         found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
             found += self._cleared(solver, begin.variables)
-            if not stages:
-                continue
-            progress(f"start {number} of {len(begins)}, narrow laws widened first")
-            variables = begin.variables
-            for stage in stages:
-                for one in self.ends(stage, variables):
-                    variables = one.variables
-            found += self._cleared(solver, variables)
         if not found:
             what = "no motion was found within the limits"
             if not self.workspace.is_free:
@@ -238,32 +218,11 @@ class MotionProgram:
         fine = [replace(one, loss=self.loss(one.variables, FINER)) for one in found]
         return min(fine, key=lambda one: one.loss)
 
-    def lazily(
-        self,
-        informations: tuple[Information, ...],
-        instants: int,
-        iterations: int,
-        torques: Collection[int],
-    ) -> LazySolver:
-        """Return the program for some of what is asked.
-
-        Parameters
-        ----------
-        informations, instants, iterations : as for `MotionSolver.of`.
-        torques : joints whose torque is limited from the beginning.
-
-        Returns
-        -------
-        It limits the torques of further joints when it is told to.
-        """
-        counts = instants, min(instants, instants_of(self.motions))
-
-        def write(torque: LimitedTorque, cuts: Sequence[RoomCut]) -> MotionSolver:
-            return MotionSolver.of(self.motions, informations, counts, iterations, torque, cuts)
-
-        function = self.torque.columns.torque
-        torque = LimitedTorque(function=function, most=self._torque_left, joints=torques)
-        return LazySolver(write, torque)
+    def solver(self) -> MotionSolver:
+        """Return the search, to be started anywhere."""
+        instants = self.instants, instants_of(self.motions)
+        shares = torque_shares(self.torque.columns.torque, self._torque_left)
+        return MotionSolver.of(self.motions, self.informations, instants, _ITERATIONS, shares)
 
     @cached_property
     def _torque_left(self) -> np.ndarray:
@@ -272,29 +231,14 @@ class MotionProgram:
         usual = motions.trajectory(motions.random(0) * _USUAL).at(t)
         return self.limits.torque * self.torque.certain(self.limits, t, *usual)
 
-    def _limited_at_once(self, begins: Sequence[DesignedMotion]) -> set[int]:
-        """Joints whose torque is limited from the beginning."""
-        limited = np.flatnonzero(np.isfinite(self.limits.torque)).tolist()
-        if len(limited) * instants_of(self.motions) <= _FEW:
-            return set(limited)
-        return {j for one in begins for j in self._torques_beyond(one.variables, _NEAR)}
-
-    def _torques_beyond(self, variables: np.ndarray, share: float) -> list[int]:
-        """Joints whose torque exceeds a share of its limit, at the instants of the program."""
+    def _torque_peaks(self, variables: np.ndarray, share: float) -> set[tuple[float, int]]:
+        """Instants (s) and joints at which torques peak above a share of their limits."""
         t = self.motions.times(instants_of(self.motions))
-        torque = np.abs(self.torque.along(t, *self.motions.trajectory(variables).at(t))).max(axis=0)
-        return np.flatnonzero(torque > share * self._torque_left).tolist()
-
-    def _softened(self) -> list[tuple[Information, ...]]:
-        """What is asked, with narrow laws made wider, the widest first."""
-        count = max((len(one) for one in self.softer), default=0)
-        return [
-            tuple(
-                soft[k] if soft else sharp
-                for soft, sharp in zip(self.softer, self.informations, strict=True)
-            )
-            for k in range(count)
-        ]
+        torque = self.torque.along(t, *self.motions.trajectory(variables).at(t))
+        used = np.abs(torque) / self._torque_left
+        before, after = np.roll(used, 1, axis=0), np.roll(used, -1, axis=0)
+        peaks = (used > share) & (used >= before) & (used >= after)
+        return {(float(t[k]), int(j)) for k, j in np.argwhere(peaks)}
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
@@ -304,16 +248,14 @@ class MotionProgram:
             for number in rng.integers(0, 2**31, starts * _TRIED)
         )
         found = [
-            DesignedMotion(variables=one, loss=self.loss(one), status=NOT_BETTER, iterations=0)
-            for one in some
-            if one is not None
+            DesignedMotion(variables=one, loss=self.loss(one)) for one in some if one is not None
         ]
         found.sort(key=lambda one: one.loss)
         # Fine grids and distances are costly: they are looked at from the best motion on.
         clear = (one for begin in found for one in self._within(begin))
         return list(islice(clear, starts))
 
-    def _cleared(self, solver: LazySolver, start: np.ndarray) -> list[DesignedMotion]:
+    def _cleared(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
         """As `ends`, in the workspace: what leaves it is moved back and solved again.
 
         What still leaves it then is made smaller.
@@ -338,51 +280,26 @@ class MotionProgram:
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
 
-    def ends(self, lazy: LazySolver, start: np.ndarray) -> list[DesignedMotion]:
+    def ends(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
         """Return the motion at which the search from a start ends; none if none is within limits.
 
         Parameters
         ----------
-        lazy : the program; the torques that turn out too large are limited in it from then on.
+        solver : the search; torques that turn out too large are limited, and it goes on.
         start : (n, 1 + k).
         """
-        solver, variables = self._end_of(lazy, start)
-        best = self._finite_within(variables)
-        while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
-            # Where a search ended beyond a limit may lead nowhere, made smaller or not.
-            for begin in (variables, start):
-                solver, variables = self._end_of(lazy, begin)
-                ended = self._finite_within(variables)
-                if ended is not None:
-                    best = ended
-                    break
-        stats = solver.function.stats()
-        if best is None:
-            return []
-        motion = DesignedMotion(
-            variables=best,
-            loss=self.loss(best),
-            status=str(stats["return_status"]).replace("_", " "),
-            iterations=int(stats["iter_count"]),
-        )
-        return [motion]
-
-    def _finite_within(self, variables: np.ndarray) -> np.ndarray | None:
-        """As `_limited`, of where a search ended; none where it ended nowhere."""
-        return self._limited(variables) if np.all(np.isfinite(variables)) else None
-
-    def _end_of(self, lazy: LazySolver, start: np.ndarray) -> tuple[MotionSolver, np.ndarray]:
-        """Where a program as it stands ends, within the limits or not."""
-        from dynident.nlp.ipopt import interruptible
-
-        solver = lazy.solver
-        bound = np.full(start.shape, np.inf)
-        bound[:, 0] = 0.999
-        bounds, begin = bound.ravel(), start.ravel()
-        if len(self.informations) > 1:
-            bounds, begin = np.append(bounds, np.inf), np.append(begin, max(self._losses(start)))
-        with interruptible():
-            result = solver.function(
-                x0=begin, lbx=-bounds, ubx=bounds, lbg=solver.rows.lower, ubg=solver.rows.upper
-            )
-        return solver, result["x"].full().ravel()[: start.size].reshape(start.shape)
+        limited, best = self._torque_peaks(start, _NEAR), None
+        for _ in range(_ROUNDS):
+            ended = solver.limiting(limited).ended(start)
+            if not np.all(np.isfinite(ended.variables)):
+                break
+            within = self._limited(ended.variables)
+            if within is not None:
+                start, loss = within, self.loss(within)
+                if best is None or loss < best.loss:
+                    best = replace(ended, variables=within, loss=loss)
+            more = self._torque_peaks(ended.variables, 1.0)
+            if more <= limited:
+                break
+            limited |= more
+        return [] if best is None else [best]
