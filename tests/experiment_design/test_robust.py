@@ -11,7 +11,7 @@ from dynident.effects import effects_of
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
-from dynident.experiment_design.design_question import DesignQuestion
+from dynident.experiment_design.design_question import DesignQuestion, RecordedFits
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -58,7 +58,7 @@ def test_a_rival_whose_shape_is_not_known_has_several_columns() -> None:
     data = small_motion(truth, true_values(truth, **{"Fq__elbow": 1.0}))
     task = DesignTask(duration=6.0, harmonics=4, tell=((DRAG, STRIBECK),))
     motions = FourierMotions(limits=MotionLimits.of(ROBOT), period=6.0, harmonics=4)
-    question = DesignQuestion.of(Model(ROBOT), data, task, motions, task.tell[0])
+    question = DesignQuestion.of(Model(ROBOT), RecordedFits(data), task, motions, task.tell[0])
     asked = question.asked(data, motions).information
     name = STRIBECK.parameter_name(STRIBECK.parameters(ROBOT)[0].name)
     shapes = [k for k, one in enumerate(asked.columns.labels) if one == name]

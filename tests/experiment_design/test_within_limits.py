@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from designs_within_limits import Drawn, seen
-from dynident.experiment_design.design_question import DesignQuestion
+from dynident.experiment_design.design_question import DesignQuestion, RecordedFits
 from dynident.experiment_design.motion_limits import above_instants
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import SIGMAS, PredictedTorque
@@ -35,7 +35,7 @@ def test_torques_are_predicted_where_small_motions_say_little(seed: int) -> None
     drawn = Drawn.of(seed)
     model, recorded = Model(drawn.described), drawn.recorded
     motions = FourierMotions(limits=drawn.limits, period=5.0, harmonics=4)
-    question = DesignQuestion.of(model, recorded, drawn.task, motions)
+    question = DesignQuestion.of(model, RecordedFits(recorded), drawn.task, motions)
     torque, t = question.torque, motions.times(300)
     motion = motions.trajectory(motions.random(5) * 0.3).at(t)
     true = drawn.robot.inverse_dynamics(*motion)
@@ -64,7 +64,9 @@ def test_random_robots_keep_their_limits(seed: int) -> None:
 def test_what_is_open_between_the_instants_looked_at_counts() -> None:
     drawn = Drawn.of(3)
     motions = FourierMotions(limits=drawn.limits, period=5.0, harmonics=4)
-    question = DesignQuestion.of(Model(drawn.described), drawn.recorded, drawn.task, motions)
+    question = DesignQuestion.of(
+        Model(drawn.described), RecordedFits(drawn.recorded), drawn.task, motions
+    )
     torque, t = question.torque, motions.times(1000)
     for seed in range(5):
         motion = motions.trajectory(motions.random(seed) * 0.3).at(t)

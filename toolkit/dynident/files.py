@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dynident.errors import FileError
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 LARGEST_DOCUMENT = 1 << 26
 """Bytes of a robot description, a study or an estimate; formats of data have other limits."""
@@ -61,8 +61,7 @@ def _remedy(path: Path) -> str:
             names = [one.name for one in itertools.islice(entries, _LOOKED_AT) if one.is_file()]
     except OSError:
         return "check the path"
-    meant = close_word(path.name, names, 0.8)
-    return f"did you mean {meant!r}?" if meant else "check the path"
+    return did_you_mean(path.name, names, "check the path", cutoff=0.8)
 
 
 def read_bytes(

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from dynident import files
 from dynident.errors import StudyError
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 
 class SettingsTable(BaseModel):
@@ -124,8 +124,7 @@ def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
     valid : words in its place.
     kind : what they are, in the plural.
     """
-    close = close_word(word, valid)
-    return f"did you mean '{close}'?" if close else f"{kind}: {', '.join(valid)}"
+    return did_you_mean(word, valid, f"{kind}: {', '.join(valid)}")
 
 
 def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:

@@ -12,18 +12,23 @@ time by its square, and is shown cut in its middle."""
 _LONG = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
-def close_word(word: str, valid: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """Return the valid word that a misspelt one resembles most, None if none does.
+def did_you_mean(
+    word: str, valid: Iterable[str], otherwise: str = "", *, cutoff: float = 0.6
+) -> str:
+    """Return the question whether the valid word was meant that a misspelt one resembles most.
 
     Parameters
     ----------
-    word : as it was written.
+    word : as it was written; its case does not matter.
     valid : words in its place.
+    otherwise : what is said where none of them resembles it.
     cutoff : likeness that is needed, from 0 to 1.
     """
     if len(word) > LONGEST_WORD:
-        return None
-    return next(iter(difflib.get_close_matches(word, list(valid), 1, cutoff)), None)
+        return otherwise
+    written = {one.lower(): one for one in reversed(list(valid))}
+    close = difflib.get_close_matches(word.lower(), list(written), 1, cutoff)
+    return f"did you mean '{written[close[0]]}'?" if close else otherwise
 
 
 def shortened(text: str) -> str:

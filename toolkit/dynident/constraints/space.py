@@ -13,7 +13,7 @@ from dynident.inertia import PARAMETERS, UNITS, frame_change, reference_body
 from dynident.model import Model
 from dynident.robot import Link, Robot
 from dynident.settings import nearest
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 _FALLBACK_LENGTH = 0.1  # m, where a robot gives no length at all
 
@@ -114,9 +114,8 @@ class ParameterSpace:
             If there is no such parameter.
         """
         if name not in self.names:
-            close = close_word(name, self.names)
             some = f"for instance {self.names[0]}, {self.names[-1]}"
-            remedy = f"did you mean '{close}'?" if close else some
+            remedy = did_you_mean(name, self.names, some)
             raise FitError(f"no standard parameter '{name}'", remedy=remedy)
         return self.names.index(name)
 

@@ -54,6 +54,25 @@ class Asked:
     rows: float
 
 
+class RecordedFits:
+    """Fits of models to what was recorded, each made once: several questions share them.
+
+    Parameters
+    ----------
+    recorded : recordings so far.
+    """
+
+    def __init__(self, recorded: Dataset) -> None:
+        self.recorded = recorded
+        self._known: dict[tuple[Effect, ...], Estimate] = {}
+
+    def of(self, model: Model) -> Estimate:
+        """Return the fit of a model; the robot is the same for all."""
+        if model.effects not in self._known:
+            self._known[model.effects] = fit(model, self.recorded)
+        return self._known[model.effects]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DesignQuestion:
     """What is asked, of which model.
@@ -79,42 +98,35 @@ class DesignQuestion:
     def of(
         cls,
         model: Model,
-        recorded: Dataset,
+        fits: RecordedFits,
         task: DesignTask,
         motions: MotionFamily,
         told: Sequence[Effect] = (),
-        estimates: dict[tuple[Effect, ...], Estimate] | None = None,
     ) -> DesignQuestion:
         """Fit what was recorded.
 
         Parameters
         ----------
         model : the robot and its effects.
-        recorded : recordings so far.
+        fits : of recordings so far.
         task : what for.
         motions : among which one is sought.
         told : one of its groups of effects.
-        estimates : of the same recordings, by their effects: what is missing is fitted and joins
-            them, so that tasks that differ in their loads have one fit.
 
         Returns
         -------
         The question of that group; without one, that of what is to be shown, or of all parameters.
         """
-        _require_no_payload(model, recorded, task)
+        _require_no_payload(model, fits.recorded, task)
         robot = model.robot
         told = tuple(one.on(robot) for one in told)
         shown = () if told else tuple(one.on(robot) for one in task.show)
         bare = model
         for one in (*told, *shown):
             bare = bare - one.label if one in bare else bare
-        whole = bare + told[:1] if told else bare
-        estimates = {} if estimates is None else estimates
-        estimate = estimates.get(whole.effects)
-        if estimate is None:
-            estimate = estimates[whole.effects] = fit(whole, recorded)
+        estimate = fits.of(bare + told[:1] if told else bare)
         fitted = {one.label: one for one in estimate.model.effects}
-        torque = _torque(estimate, recorded, motions)
+        torque = _torque(estimate, fits.recorded, motions)
         if task.load:
             torque = torque.carrying(usual_load(robot, task.load))
             bare = bare + payload_effect(robot)

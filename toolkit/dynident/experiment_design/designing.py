@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.arguments import checked
-from dynident.effects import Effect
 from dynident.errors import DesignError
-from dynident.experiment_design.design_question import Asked, DesignQuestion
+from dynident.experiment_design.design_question import Asked, DesignQuestion, RecordedFits
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.geometry.workspace import Workspace
@@ -76,9 +75,9 @@ def design(
     limits.require_ranges(model.robot)
     recorded = Dataset.of(recorded, model.robot.names)
     loads = tuple(dict.fromkeys(task.loads))
-    estimates: dict[tuple[Effect, ...], Estimate] = {}
+    fits = RecordedFits(recorded)
     if len(loads) < 2:
-        return _designed(model, recorded, task, limits, progress, estimates)
+        return _designed(model, fits, task, limits, progress)
     found: list[RecordingDesign] = []
     tried: list[LoadTried] = []
     refused: list[DesignError] = []
@@ -86,7 +85,7 @@ def design(
         progress(f"with {load:g} kg on the last link")
         with_load = replace(task, loads=(load,))
         try:
-            one = _designed(model, recorded, with_load, limits, progress, estimates)
+            one = _designed(model, fits, with_load, limits, progress)
         except DesignError as error:  # a load may be too heavy
             tried.append(LoadTried(mass=load, why=str(error)))
             refused.append(error)
@@ -101,27 +100,24 @@ def design(
 
 def _designed(
     model: Model,
-    recorded: Dataset,
+    fits: RecordedFits,
     task: DesignTask,
     limits: MotionLimits,
     progress: Callable[[str], None],
-    estimates: dict[tuple[Effect, ...], Estimate],
 ) -> RecordingDesign:
     """The design with one load, or with none.
 
     Parameters
     ----------
-    model, recorded, task, limits, progress : as for `design`; of the loads, the first.
-    estimates : as for `DesignQuestion.of`.
+    model, task, limits, progress : as for `design`; of the loads, the first.
+    fits : of what was recorded.
     """
     workspace = _workspace(model.robot, task, limits)
     motions = _motions(task, limits)
     progress("fitting what was recorded")
-    questions = [
-        DesignQuestion.of(model, recorded, task, motions, told, estimates)
-        for told in task.tell or ((),)
-    ]
+    questions = [DesignQuestion.of(model, fits, task, motions, told) for told in task.tell or ((),)]
     progress("writing the columns out")
+    recorded = fits.recorded
     asked = [one.asked(recorded, motions) for one in questions]
     program = MotionProgram(
         informations=tuple(one.information for one in asked),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_expressions import ColumnExpression, may_be_expression, parse
 from dynident.recording.formats.column_table import ColumnTable
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 REQUIRED = ("q", "tau")
 OPTIONAL = ("v", "a", "q_ref")
@@ -260,6 +260,5 @@ def _there(table: ColumnTable) -> str:
 
 
 def _close(name: str, names: Sequence[str]) -> str:
-    lower = {one.lower(): one for one in reversed(names)}
-    close = close_word(name.lower(), lower)
-    return f"; did you mean '{lower[close]}'?" if close else ""
+    hint = did_you_mean(name, names)
+    return f"; {hint}" if hint else ""

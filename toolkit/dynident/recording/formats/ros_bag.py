@@ -30,7 +30,7 @@ from dynident.recording.formats.limits import (
     require_few,
     require_unpacked,
 )
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 METADATA = "metadata.yaml"
@@ -274,8 +274,7 @@ def _topic(counts: dict[tuple[str, str], int], topic: str, file: str) -> str:
         if topic in fitting:
             return topic
         kinds = [kind for name, kind in counts if name == topic]
-        near = close_word(topic, fitting, 0.4)
-        remedy = f"did you mean '{near}'?" if near else "name another topic"
+        remedy = did_you_mean(topic, fitting, "name another topic", cutoff=0.4)
         what = f"has the type {kinds[0]}" if kinds else "is not in it"
         raise RecordingError(f"the topic '{topic}' {what}", file, remedy)
     held = [name for name in fitting if counts[name, _JOINT_STATE]] or fitting

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynident.errors import RobotError
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 Element = ElementTree.Element
 
@@ -202,7 +202,5 @@ def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.fl
 def closest(name: str, valid: Iterable[str]) -> str:
     """Return a remedy for a misspelt name: the nearest valid one, and the list."""
     valid = list(valid)
-    near = close_word(name, valid)
     listed = ", ".join(valid) if valid else "none"
-    hint = f"did you mean '{near}'? " if near else ""
-    return f"{hint}Valid names: {listed}"
+    return f"{did_you_mean(name, valid)} Valid names: {listed}".lstrip()

@@ -10,7 +10,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable
 from dynident.recording.formats.limits import require_few
-from dynident.words import close_word
+from dynident.words import did_you_mean
 
 COLUMNS = "columns"
 """Array of text, in the same file, that names the columns of every record."""
@@ -36,9 +36,8 @@ def pick(table: ColumnTable, record: str) -> ColumnTable:
         raise RecordingError(what, table.file, remedy)
     records = [name for name in table.names if name != COLUMNS]
     if record not in records:
-        close = close_word(record, records)
         shown = ", ".join(records[:20]) + (", ..." if len(records) > 20 else "")
-        remedy = f"did you mean '{close}'?" if close else f"it holds {shown or 'none'}"
+        remedy = did_you_mean(record, records, f"it holds {shown or 'none'}")
         raise RecordingError(f"no record '{record}'", table.file, remedy)
     names = _column_names(table)
     where = f"{table.file}, record {record}"
