@@ -27,8 +27,8 @@ from dynident.experiment_design.motion_solver import (
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
 
-_PER_WAVE = 22  # instants
-_LEAST, _LEAST_NARROW = 100, 300
+_PER_WAVE = 14  # instants
+_LEAST, _LEAST_NARROW = 64, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
 _TRIED = 20  # random motions for each start
@@ -38,10 +38,11 @@ wider laws leads to no better motions than as many searches from elsewhere do.""
 _ITERATIONS = 150
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
-_CUTS = 6  # rounds of bounds that keep a motion in the workspace
 _USUAL = 0.3  # of a random motion's size
 _NEAR = 0.7  # of a limit of torque, from which on the search imposes it from the beginning
-_ROUNDS = 6  # of limits on torques that turn out too large
+_LARGE = 0.5  # of a limit of torque, from which on an instant of such a joint counts
+_ROUNDS = 6  # of bounds on what turns out beyond a limit of torque or out of the workspace
+_LOST = 0.02  # of a loss, for each logarithm that it sums, by making a motion smaller: no matter
 _ROUNDING = 1e-9
 
 
@@ -207,7 +208,7 @@ class MotionProgram:
         found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
-            found += self._cleared(solver, begin.variables)
+            found += self.ends(solver, begin.variables)
         if not found:
             what = "no motion was found within the limits"
             if not self.workspace.is_free:
@@ -231,14 +232,17 @@ class MotionProgram:
         usual = motions.trajectory(motions.random(0) * _USUAL).at(t)
         return self.limits.torque * self.torque.certain(self.limits, t, *usual)
 
-    def _torque_peaks(self, variables: np.ndarray, share: float) -> set[tuple[float, int]]:
-        """Instants (s) and joints at which torques peak above a share of their limits."""
+    def _torques_beyond(self, variables: np.ndarray, share: float) -> set[tuple[float, int]]:
+        """Instants (s) and joints of large torques, of joints that exceed a share of their limit.
+
+        Of these alone: what is limited where it peaks only, peaks elsewhere then; and of many rows
+        that are nearly the same from one instant to the next, SLSQP fails to make a step.
+        """
         t = self.motions.times(instants_of(self.motions))
         torque = self.torque.along(t, *self.motions.trajectory(variables).at(t))
         used = np.abs(torque) / self._torque_left
-        before, after = np.roll(used, 1, axis=0), np.roll(used, -1, axis=0)
-        peaks = (used > share) & (used >= before) & (used >= after)
-        return {(float(t[k]), int(j)) for k, j in np.argwhere(peaks)}
+        large = (used > _LARGE) & (used.max(axis=0) > share)
+        return {(float(t[k]), int(j)) for k, j in np.argwhere(large)}
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
@@ -255,26 +259,6 @@ class MotionProgram:
         clear = (one for begin in found for one in self._within(begin))
         return list(islice(clear, starts))
 
-    def _cleared(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
-        """As `ends`, in the workspace: what leaves it is moved back and solved again.
-
-        What still leaves it then is made smaller.
-        """
-        found = self.ends(solver, start)
-        if self.workspace.is_free:
-            return found
-        t, cuts = self.motions.times(FINER * self.instants), []
-        for _ in range(_CUTS):
-            if not found:
-                return []
-            variables = found[0].variables
-            new = self.workspace.cuts(t, self.motions.trajectory(variables).at(t)[0])
-            if not new:
-                break
-            cuts += new
-            found = self.ends(solver.cut(cuts), variables)
-        return [clear for one in found for clear in self._within(one)]
-
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
         """The motion, made smaller until it is within all limits; none where that fails."""
         best = self.within(motion.variables)
@@ -285,21 +269,29 @@ class MotionProgram:
 
         Parameters
         ----------
-        solver : the search; torques that turn out too large are limited, and it goes on.
+        solver : the search, of motions within linear limits. Where a motion is beyond those of
+            torque, or out of the workspace, it is bounded there, and the search goes on.
         start : (n, 1 + k).
         """
-        limited, best = self._torque_peaks(start, _NEAR), None
+        torques, cuts = self._torques_beyond(start, _NEAR), []
+        fine, best = self.motions.times(FINER * self.instants), None
         for _ in range(_ROUNDS):
-            ended = solver.limiting(limited).ended(start)
+            ended = solver.limiting(torques).cut(cuts).ended(start)
             if not np.all(np.isfinite(ended.variables)):
                 break
-            within = self._limited(ended.variables)
+            (within,) = self._within(ended) or (None,)
             if within is not None:
-                start, loss = within, self.loss(within)
-                if best is None or loss < best.loss:
-                    best = replace(ended, variables=within, loss=loss)
-            more = self._torque_peaks(ended.variables, 1.0)
-            if more <= limited:
+                start = within.variables
+                if best is None or within.loss < best.loss:
+                    best = within
+                if within.loss - self.loss(ended.variables) < _LOST * solver.terms:
+                    break
+            if not ended.settled:  # where it failed says nothing of where it was to go
                 break
-            limited |= more
+            more = self._torques_beyond(ended.variables, 1.0) - torques
+            position = self.motions.trajectory(ended.variables).at(fine)[0]
+            new = [] if self.workspace.is_free else self.workspace.cuts(fine, position)
+            if not more and not new:
+                break
+            torques, cuts = torques | more, cuts + new
         return [] if best is None else [best]

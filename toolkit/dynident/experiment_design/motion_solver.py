@@ -4,8 +4,8 @@ There are few variables (nine or so a joint) and thousands of limits, nearly all
 which few are used at the end. That is what a method of active sets is for: on the arm of
 `problems/seven_joint_arm` SLSQP tells joint zero from spring better after 48 iterations in 1.2 s
 than Ipopt after 150 in 14 s. Torques are not linear, and rows of them at all instants, which are
-nearly the same from one to the next, made SLSQP fail in one of four searches: they are limited at
-the instants alone at which they turn out too large.
+nearly the same from one to the next, made SLSQP fail in one of four searches: they are limited
+where they turn out too large.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ class MotionSolver:
     grid : of the instants at which columns are evaluated.
     losses : casadi.Function of each question: q, v, a and the time at all instants, to the loss and
         its slopes by them.
-    settled : change of the loss at which the search ends.
+    terms : logarithms that the loss is the sum of.
     linear : rows of position, speed, acceleration and jerk.
     shares : of torques, see `LimitedTorque.function`.
     iterations : at most.
@@ -217,7 +217,7 @@ class MotionSolver:
     motions: MotionFamily
     grid: MotionGrid
     losses: tuple[Any, ...]
-    settled: float
+    terms: int
     linear: Rows
     shares: Any
     iterations: int
@@ -252,7 +252,7 @@ class MotionSolver:
             motions=motions,
             grid=grid,
             losses=tuple(one.loss_function(evaluated) for one in informations),
-            settled=_SETTLED * max(one.terms for one in informations),
+            terms=max(one.terms for one in informations),
             linear=_linear_rows(motions, limited),
             shares=shares,
             iterations=iterations,
@@ -273,6 +273,8 @@ class MotionSolver:
 
     def cut(self, cuts: Sequence[RoomCut]) -> MotionSolver:
         """Return the search with bounds on the position at single instants, too."""
+        if not cuts:
+            return self
         grid = MotionGrid.of(self.motions, np.array([one.t for one in cuts]))
         slopes = np.array(
             [one.slope[:, None] * grid.slopes[0, :, k] for k, one in enumerate(cuts)]
@@ -317,7 +319,7 @@ class MotionSolver:
             method="SLSQP",
             bounds=np.column_stack([-bounds, bounds]),
             constraints={"type": "ineq", "fun": program.left, "jac": program.slopes_left},
-            options={"maxiter": self.iterations, "ftol": self.settled / program.scale},
+            options={"maxiter": self.iterations, "ftol": _SETTLED * self.terms / program.scale},
         )
         return DesignedMotion(
             variables=ended.x[: start.size].reshape(start.shape),
