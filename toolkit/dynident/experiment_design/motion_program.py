@@ -32,6 +32,7 @@ _LEAST, _LEAST_NARROW = 64, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
 _TRIED = 20  # random motions for each start
+_MORE = 10  # that are drawn at most, over those whose centre is free
 _NARROW_STARTS = 3
 """Searches for narrow laws, over those for others: they end at many places. To go to them by way of
 wider laws leads to no better motions than as many searches from elsewhere do."""
@@ -246,11 +247,12 @@ class MotionProgram:
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
-        rng = np.random.default_rng(seed)
-        some = (
-            self._limited(self.motions.random(int(number)), finer=1)
-            for number in rng.integers(0, 2**31, starts * _TRIED)
-        )
+        tried = starts * _TRIED
+        numbers = np.random.default_rng(seed).integers(0, 2**31, _MORE * tried)
+        drawn = (self.motions.random(int(number)) for number in numbers)
+        # About a centre that is not free there is no room for a motion of any size.
+        free = (one for one in drawn if self.workspace.admits(self.motions.centre(one)[None]))
+        some = (self._limited(one, finer=1) for one in islice(free, tried))
         found = [
             DesignedMotion(variables=one, loss=self.loss(one)) for one in some if one is not None
         ]
@@ -276,7 +278,7 @@ class MotionProgram:
         torques, cuts = self._torques_beyond(start, _NEAR), []
         fine, best = self.motions.times(FINER * self.instants), None
         for _ in range(_ROUNDS):
-            ended = solver.limiting(torques).cut(cuts).ended(start)
+            ended = solver.limiting(torques).cut(cuts, start).ended(start)
             if not np.all(np.isfinite(ended.variables)):
                 break
             (within,) = self._within(ended) or (None,)

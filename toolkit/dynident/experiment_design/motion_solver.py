@@ -27,6 +27,7 @@ _OTHERS = 0.2
 worst told pair does not need stood still: in `problems/which_of_two` three pairs were told by 15,
 13 and 17 standard deviations, and with the mean by 416, 105 and 15."""
 _CENTRES = 0.999  # of half a joint's range, that the centre of a motion may be from its middle
+_ROUNDING = 1e-6  # of what is left of a limit
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
 
 
@@ -271,8 +272,15 @@ class MotionSolver:
         grid = MotionGrid.of(self.motions, times)
         return replace(self, torque=LimitedTorque(self.shares, grid, joints))
 
-    def cut(self, cuts: Sequence[RoomCut]) -> MotionSolver:
-        """Return the search with bounds on the position at single instants, too."""
+    def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray) -> MotionSolver:
+        """Return the search with bounds on the position at single instants, too.
+
+        Parameters
+        ----------
+        cuts : the bounds.
+        inside : (n, k) of a motion that is known to need none: a bound that it does not meet, as
+            room is not linear, is moved to where it does.
+        """
         if not cuts:
             return self
         grid = MotionGrid.of(self.motions, np.array([one.t for one in cuts]))
@@ -280,7 +288,8 @@ class MotionSolver:
             [one.slope[:, None] * grid.slopes[0, :, k] for k, one in enumerate(cuts)]
         ).reshape(len(cuts), -1)
         least = np.array([one.least - one.slope @ grid.middle for one in cuts])
-        return replace(self, linear=Rows.joined([self.linear, Rows(-least, slopes)]))
+        rows = Rows(-np.minimum(least, slopes @ inside.ravel()), slopes)
+        return replace(self, linear=Rows.joined([self.linear, rows]))
 
     def found_losses(self, variables: np.ndarray) -> Rows:
         """Return the loss of each question, and their slopes.
@@ -308,24 +317,39 @@ class MotionSolver:
         program = _Program(self, start)
         bound = np.full(start.shape, np.inf)
         bound[:, 0] = _CENTRES
-        begin, bounds = start.ravel(), bound.ravel()
+        bounds, begin = bound.ravel(), start.ravel()
         if program.several:
             begin = np.append(begin, self.found_losses(start).values.max())
             bounds = np.append(bounds, np.inf)
-        ended = minimize(
-            program.objective,
-            begin,
-            jac=True,
-            method="SLSQP",
-            bounds=np.column_stack([-bounds, bounds]),
-            constraints={"type": "ineq", "fun": program.left, "jac": program.slopes_left},
-            options={"maxiter": self.iterations, "ftol": _SETTLED * self.terms / program.scale},
-        )
+        spent = 0
+        while True:
+            ended = minimize(
+                program.objective,
+                begin,
+                jac=True,
+                method="SLSQP",
+                bounds=np.column_stack([-bounds, bounds]),
+                constraints={"type": "ineq", "fun": program.left, "jac": program.slopes_left},
+                options={
+                    "maxiter": self.iterations - spent,
+                    "ftol": _SETTLED * self.terms / program.scale,
+                },
+            )
+            spent += int(ended.nit)
+            if ended.success or program.lowest is None:
+                x = ended.x
+                break
+            # It fails where its idea of the curvature has gone wrong: from the best motion within
+            # limits it begins with none.
+            x, again = program.lowest, not np.array_equal(program.lowest, begin)
+            if spent >= self.iterations or not again:
+                break
+            begin = x
         return DesignedMotion(
-            variables=ended.x[: start.size].reshape(start.shape),
+            variables=x[: start.size].reshape(start.shape),
             loss=float(ended.fun),
             status=str(ended.message),
-            iterations=int(ended.nit),
+            iterations=spent,
             settled=bool(ended.success),
         )
 
@@ -341,6 +365,9 @@ class _Program:
         self._solver, self._shape, self._size = solver, start.shape, start.size
         self.several = len(solver.losses) > 1
         self._at: dict[str, tuple[bytes, Rows]] = {}
+        self.lowest: np.ndarray | None = None
+        """Of the points at which rows were positive, the one of the lowest loss."""
+        self._least = np.inf
         # The first step is as long as the slope: a share of each joint's range and speed.
         self.scale = float(np.linalg.norm(solver.found_losses(start).slopes.mean(axis=0))) or 1.0
 
@@ -363,7 +390,10 @@ class _Program:
             found.append(self._once("torque", self._solver.torque.rows, x).values)
         if self.several:
             found.append(x[-1] - self.losses(x).values)
-        return np.concatenate(found)
+        left, (loss, _) = np.concatenate(found), self.objective(x)
+        if loss < self._least and left.min() >= -_ROUNDING:
+            self.lowest, self._least = np.array(x), loss
+        return left
 
     def slopes_left(self, x: np.ndarray) -> np.ndarray:
         """Slopes of `left`."""
