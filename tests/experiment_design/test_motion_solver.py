@@ -86,10 +86,17 @@ def test_linear_rows_leave_what_the_limits_leave(family: MotionFamily) -> None:
 @all_families
 def test_cuts_and_limited_torques_are_rows_at_their_instants(family: MotionFamily) -> None:
     x = 0.1 * family.random(3)
-    solver = solver_of(family).limiting(PEAKS).cut(CUTS)
+    solver = solver_of(family).limiting(PEAKS)
     (cut,), motion = CUTS, family.trajectory(x)
     left = cut.slope @ motion.at(np.array([cut.t]))[0][0] - cut.least
-    assert solver.linear.at(x.ravel())[-1] == pytest.approx(left, abs=1e-12)
+    inside = 0.2 * x / abs(left) if left < 0 else x
+    cutting = solver.cut(CUTS, inside)
+    assert cutting.linear.at(x.ravel())[-1] == pytest.approx(left, abs=1e-12)
+    assert len(cutting.linear.values) == len(solver.linear.values) + 1
+    # A bound that a motion within the workspace does not meet is moved to where it does.
+    strict = [replace(cut, least=cut.least + left + 0.3)]
+    assert solver.cut(strict, x).linear.at(x.ravel())[-1] == pytest.approx(0.0, abs=1e-12)
+    assert solver.cut([], x) is solver
     assert solver.torque is not None
     t, joints = (np.array(one) for one in zip(*PEAKS, strict=True))
     share = (COLUMNS.torque_along(t, *motion.at(t)) / MOST)[np.arange(len(t)), joints]

@@ -17,8 +17,9 @@ import numpy as np
 from dynident.errors import DesignError
 from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
-from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.motion_limits import MotionLimits, above_instants
 from dynident.experiment_design.motion_solver import (
+    CENTRES,
     DesignedMotion,
     MotionSolver,
     joined,
@@ -145,8 +146,7 @@ class MotionProgram:
     def _limited(self, variables: np.ndarray, finer: int = FINER) -> np.ndarray | None:
         """The motion within the limits at `finer` times the instants, in the workspace or not."""
         t = self.motions.times(finer * self.instants)
-        found = np.array(variables)
-        found[:, 0] = np.clip(found[:, 0], -0.999, 0.999)
+        found = self._moved_inside(variables, t)
         still = np.array(found)
         still[:, 1:] = 0.0
         # What its own weight takes of a drive where the robot stands, no smaller motion gives back.
@@ -165,6 +165,22 @@ class MotionProgram:
             else:
                 found[:, 1:] *= 0.5
         return None
+
+    def _moved_inside(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """The motion, each joint whose range it fits into moved to within that.
+
+        A motion that is a little beyond one end, about a centre that is near it, would have to be
+        made very small.
+        """
+        limits, found = self.limits, np.array(variables)
+        found[:, 0] = np.clip(found[:, 0], -CENTRES, CENTRES)
+        q = self.motions.trajectory(found).at(t)[0]
+        reach = above_instants(q).max(axis=0)
+        below, above = limits.lower - q.min(axis=0) + reach, q.max(axis=0) + reach - limits.upper
+        moved = np.where(below + above < 0, np.maximum(below, 0.0) - np.maximum(above, 0.0), 0.0)
+        found[:, 0] += moved / ((limits.upper - limits.lower) / 2)
+        found[:, 0] = np.clip(found[:, 0], -CENTRES, CENTRES)
+        return found
 
     def excess(self, variables: np.ndarray, t: np.ndarray) -> float:
         """Return the largest share of a limit that a motion uses.

@@ -26,7 +26,8 @@ _OTHERS = 0.2
 """Weight of the mean of several losses beside the largest. Of the largest alone, joints that the
 worst told pair does not need stood still: in `problems/which_of_two` three pairs were told by 15,
 13 and 17 standard deviations, and with the mean by 416, 105 and 15."""
-_CENTRES = 0.999  # of half a joint's range, that the centre of a motion may be from its middle
+CENTRES = 0.999
+"""Of half a joint's range: how far the centre of a motion may be from its middle."""
 _ROUNDING = 1e-6  # of what is left of a limit
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
 
@@ -316,7 +317,7 @@ class MotionSolver:
 
         program = _Program(self, start)
         bound = np.full(start.shape, np.inf)
-        bound[:, 0] = _CENTRES
+        bound[:, 0] = CENTRES
         bounds, begin = bound.ravel(), start.ravel()
         if program.several:
             begin = np.append(begin, self.found_losses(start).values.max())
