@@ -37,13 +37,12 @@ _MORE = 10  # that are drawn at most, over those whose centre is free
 _NARROW_STARTS = 3
 """Searches for narrow laws, over those for others: they end at many places. To go to them by way of
 wider laws leads to no better motions than as many searches from elsewhere do."""
-_ITERATIONS = 150
+_ITERATIONS, _ITERATIONS_ALL = 150, 300  # of a search, and of all that go on from where one ended
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _USUAL = 0.3  # of a random motion's size
 _NEAR = 0.7  # of a limit of torque, from which on the search imposes it from the beginning
 _LARGE = 0.5  # of a limit of torque, from which on an instant of such a joint counts
-_ROUNDS = 6  # of bounds on what turns out beyond a limit of torque or out of the workspace
 _LOST = 0.02  # of a loss, for each logarithm that it sums, by making a motion smaller: no matter
 _ROUNDING = 1e-9
 
@@ -292,22 +291,28 @@ class MotionProgram:
         start : (n, 1 + k).
         """
         torques, cuts = self._torques_beyond(start, _NEAR), []
-        fine, best = self.motions.times(FINER * self.instants), None
-        for _ in range(_ROUNDS):
-            ended = solver.limiting(torques).cut(cuts, start).ended(start)
+        fine, inside, best = self.motions.times(FINER * self.instants), start, None
+        spent = 0
+        while spent < _ITERATIONS_ALL:
+            limited = solver.limiting(torques)
+            ended = limited.cut(cuts).ended(start)
+            spent += ended.iterations
+            if not ended.settled and start is not inside:
+                ended = limited.cut(cuts, inside).ended(inside)
+                spent += ended.iterations
             if not np.all(np.isfinite(ended.variables)):
                 break
             (within,) = self._within(ended) or (None,)
-            if within is not None:
-                start = within.variables
-                if best is None or within.loss < best.loss:
-                    best = within
-                if within.loss - self.loss(ended.variables) < _LOST * solver.terms:
-                    break
-            if not ended.settled:  # where it failed says nothing of where it was to go
+            if within is not None and (best is None or within.loss < best.loss):
+                best, inside = within, within.variables
+            lost = within is None or within.loss - self.loss(ended.variables) > _LOST * solver.terms
+            # Where it failed says nothing of where it was to go.
+            if not lost or not ended.settled:
                 break
-            more = self._torques_beyond(ended.variables, 1.0) - torques
-            position = self.motions.trajectory(ended.variables).at(fine)[0]
+            # It goes on from there, or one bound pushes it to where it is beyond another.
+            start = ended.variables
+            more = self._torques_beyond(start, 1.0) - torques
+            position = self.motions.trajectory(start).at(fine)[0]
             new = [] if self.workspace.is_free else self.workspace.cuts(fine, position)
             if not more and not new:
                 break

@@ -273,14 +273,14 @@ class MotionSolver:
         grid = MotionGrid.of(self.motions, times)
         return replace(self, torque=LimitedTorque(self.shares, grid, joints))
 
-    def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray) -> MotionSolver:
+    def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray | None = None) -> MotionSolver:
         """Return the search with bounds on the position at single instants, too.
 
         Parameters
         ----------
         cuts : the bounds.
-        inside : (n, k) of a motion that is known to need none: a bound that it does not meet, as
-            room is not linear, is moved to where it does.
+        inside : (n, k) of a motion that needs none, to begin at: a bound that it does not meet, as
+            room is not linear, is moved to where it does. None for bounds as they are.
         """
         if not cuts:
             return self
@@ -289,7 +289,9 @@ class MotionSolver:
             [one.slope[:, None] * grid.slopes[0, :, k] for k, one in enumerate(cuts)]
         ).reshape(len(cuts), -1)
         least = np.array([one.least - one.slope @ grid.middle for one in cuts])
-        rows = Rows(-np.minimum(least, slopes @ inside.ravel()), slopes)
+        if inside is not None:
+            least = np.minimum(least, slopes @ inside.ravel())
+        rows = Rows(-least, slopes)
         return replace(self, linear=Rows.joined([self.linear, rows]))
 
     def found_losses(self, variables: np.ndarray) -> Rows:
