@@ -26,7 +26,7 @@ _PATH = click.Path(path_type=Path)
 @STUDY
 @answered
 @click.option("--duration", type=float, default=10.0, show_default=True, help="s, of a repetition.")
-@click.option("--repeat", type=click.IntRange(1, 1000), default=4, show_default=True)
+@click.option("--repeat", type=click.IntRange(1, 1000), default=3, show_default=True)
 @click.option(
     "--harmonics", type=click.IntRange(2, 60), show_default="8", help="Of Fourier series."
 )
@@ -35,7 +35,7 @@ _PATH = click.Path(path_type=Path)
     type=click.IntRange(2, 200),
     help="Of B-splines, in the place of Fourier series.",
 )
-@click.option("--starts", type=click.IntRange(1, 100), default=4, show_default=True)
+@click.option("--starts", type=click.IntRange(1, 100), default=3, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--objective", type=click.Choice(["D", "A"]), default="D", show_default=True)
 @click.option(

@@ -43,7 +43,7 @@ class DesignTask:
     tell: tuple[tuple[Effect, ...], ...] = ()
     show: tuple[Effect, ...] = ()
     joints: tuple[str, ...] = ()
-    starts: int = 4
+    starts: int = 3
     seed: int = 0
     clearance: float | None = None
     loads: tuple[float, ...] = ()

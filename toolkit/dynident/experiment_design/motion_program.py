@@ -32,9 +32,10 @@ _PER_WAVE = 14  # instants
 _LEAST, _LEAST_NARROW = 64, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
-_TRIED = 20  # random motions for each start
+_TRIED, _GLANCES = 20, 4  # random motions for each search, and those of them that are bettered
+_GLANCE = 8  # iterations, after which the best of these are sought on from
 _MORE = 10  # that are drawn at most, over those whose centre is free
-_NARROW_STARTS = 3
+_NARROW_STARTS = 2
 """Searches for narrow laws, over those for others: they end at many places. To go to them by way of
 wider laws leads to no better motions than as many searches from elsewhere do."""
 _ITERATIONS, _ITERATIONS_ALL = 150, 300  # of a search, and of all that go on from where one ended
@@ -144,7 +145,7 @@ class MotionProgram:
 
     def _limited(self, variables: np.ndarray, finer: int = FINER) -> np.ndarray | None:
         """The motion within the limits at `finer` times the instants, in the workspace or not."""
-        t = self.motions.times(finer * self.instants)
+        t = self.motions.times(finer * instants_of(self.motions))
         found = self._moved_inside(variables, t)
         still = np.array(found)
         still[:, 1:] = 0.0
@@ -219,8 +220,9 @@ class MotionProgram:
         DesignError
             If no start ends at a motion within the limits.
         """
-        begins = self._begins(starts * (_NARROW_STARTS if self.narrow else 1), seed)
         solver = self.solver()
+        progress("looking for beginnings")
+        begins = self._begins(starts * (_NARROW_STARTS if self.narrow else 1), seed)
         found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
@@ -237,9 +239,12 @@ class MotionProgram:
 
     def solver(self) -> MotionSolver:
         """Return the search, to be started anywhere."""
-        instants = self.instants, instants_of(self.motions)
+        return self._solver(self.instants, _ITERATIONS)
+
+    def _solver(self, evaluated: int, iterations: int) -> MotionSolver:
+        instants = evaluated, instants_of(self.motions)
         shares = torque_shares(self.torque.columns.torque, self._torque_left)
-        return MotionSolver.of(self.motions, self.informations, instants, _ITERATIONS, shares)
+        return MotionSolver.of(self.motions, self.informations, instants, iterations, shares)
 
     @cached_property
     def _torque_left(self) -> np.ndarray:
@@ -261,7 +266,7 @@ class MotionProgram:
         return {(float(t[k]), int(j)) for k, j in np.argwhere(large)}
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
-        """The best of many random motions within the limits."""
+        """The best motions that a few iterations make of random ones, within the limits."""
         tried = starts * _TRIED
         numbers = np.random.default_rng(seed).integers(0, 2**31, _MORE * tried)
         drawn = (self.motions.random(int(number)) for number in numbers)
@@ -274,10 +279,17 @@ class MotionProgram:
         found.sort(key=lambda one: one.loss)
         # Fine grids and distances are costly: they are looked at from the best motion on.
         clear = (one for begin in found for one in self._within(begin))
-        return list(islice(clear, starts))
+        begins = list(islice(clear, _GLANCES * starts))
+        short = self._solver(instants_of(self.motions), _GLANCE)
+        for begin in tuple(begins):
+            torques = self._torques_beyond(begin.variables, _NEAR)
+            begins += self._within(short.limiting(torques).ended(begin.variables))
+        return sorted(begins, key=lambda one: one.loss)[:starts]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
         """The motion, made smaller until it is within all limits; none where that fails."""
+        if not np.all(np.isfinite(motion.variables)):
+            return []
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
 
@@ -300,8 +312,6 @@ class MotionProgram:
             if not ended.settled and start is not inside:
                 ended = limited.cut(cuts, inside).ended(inside)
                 spent += ended.iterations
-            if not np.all(np.isfinite(ended.variables)):
-                break
             (within,) = self._within(ended) or (None,)
             if within is not None and (best is None or within.loss < best.loss):
                 best, inside = within, within.variables
