@@ -146,7 +146,8 @@ class MotionProgram:
     def _limited(self, variables: np.ndarray, finer: int = FINER) -> np.ndarray | None:
         """The motion within the limits at `finer` times the instants, in the workspace or not."""
         t = self.motions.times(finer * instants_of(self.motions))
-        found = self._moved_inside(variables, t)
+        found = np.array(variables)
+        found[:, 0] = np.clip(found[:, 0], -CENTRES, CENTRES)
         still = np.array(found)
         still[:, 1:] = 0.0
         # What its own weight takes of a drive where the robot stands, no smaller motion gives back.
@@ -165,22 +166,6 @@ class MotionProgram:
             else:
                 found[:, 1:] *= 0.5
         return None
-
-    def _moved_inside(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The motion, each joint whose range it fits into moved to within that.
-
-        A motion that is a little beyond one end, about a centre that is near it, would have to be
-        made very small.
-        """
-        limits, found = self.limits, np.array(variables)
-        found[:, 0] = np.clip(found[:, 0], -CENTRES, CENTRES)
-        q = self.motions.trajectory(found).at(t)[0]
-        reach = above_instants(q).max(axis=0)
-        below, above = limits.lower - q.min(axis=0) + reach, q.max(axis=0) + reach - limits.upper
-        moved = np.where(below + above < 0, np.maximum(below, 0.0) - np.maximum(above, 0.0), 0.0)
-        found[:, 0] += moved / ((limits.upper - limits.lower) / 2)
-        found[:, 0] = np.clip(found[:, 0], -CENTRES, CENTRES)
-        return found
 
     def excess(self, variables: np.ndarray, t: np.ndarray) -> float:
         """Return the largest share of a limit that a motion uses.
@@ -283,7 +268,7 @@ class MotionProgram:
         short = self._solver(instants_of(self.motions), _GLANCE)
         for begin in tuple(begins):
             torques = self._torques_beyond(begin.variables, _NEAR)
-            begins += self._within(short.limiting(torques).ended(begin.variables))
+            begins += self._within(self._ended(short.limiting(torques), begin.variables))
         return sorted(begins, key=lambda one: one.loss)[:starts]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
@@ -292,6 +277,24 @@ class MotionProgram:
             return []
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
+
+    def _ended(self, solver: MotionSolver, start: np.ndarray) -> DesignedMotion:
+        """Where a search ends, each joint whose range the motion fits into moved to within that.
+
+        Between the instants of a search a motion may be a little beyond one end of a range. About a
+        centre that is near it, it would have to be made very small.
+        """
+        ended = solver.ended(start)
+        if not np.all(np.isfinite(ended.variables)):
+            return ended
+        limits, found = self.limits, ended.variables
+        q = self.motions.trajectory(found).at(self.motions.times(FINER * self.instants))[0]
+        reach = above_instants(q).max(axis=0)
+        below, above = limits.lower - q.min(axis=0) + reach, q.max(axis=0) + reach - limits.upper
+        moved = np.where(below + above < 0, np.maximum(below, 0.0) - np.maximum(above, 0.0), 0.0)
+        centre = found[:, 0] + moved / ((limits.upper - limits.lower) / 2)
+        centre = np.clip(centre, -CENTRES, CENTRES)
+        return replace(ended, variables=np.column_stack([centre, found[:, 1:]]))
 
     def ends(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
         """Return the motion at which the search from a start ends; none if none is within limits.
@@ -307,10 +310,10 @@ class MotionProgram:
         spent = 0
         while spent < _ITERATIONS_ALL:
             limited = solver.limiting(torques)
-            ended = limited.cut(cuts).ended(start)
+            ended = self._ended(limited.cut(cuts), start)
             spent += ended.iterations
             if not ended.settled and start is not inside:
-                ended = limited.cut(cuts, inside).ended(inside)
+                ended = self._ended(limited.cut(cuts, inside), inside)
                 spent += ended.iterations
             (within,) = self._within(ended) or (None,)
             if within is not None and (best is None or within.loss < best.loss):
