@@ -39,6 +39,7 @@ _NARROW_STARTS = 2
 """Searches for narrow laws, over those for others: they end at many places. To go to them by way of
 wider laws leads to no better motions than as many searches from elsewhere do."""
 _ITERATIONS, _ITERATIONS_ALL = 150, 300  # of a search, and of all that go on from where one ended
+_ROUNDS = 12  # of these
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _USUAL = 0.3  # of a random motion's size
@@ -308,7 +309,7 @@ class MotionProgram:
         torques, cuts = self._torques_beyond(start, _NEAR), []
         fine, inside, best = self.motions.times(FINER * self.instants), start, None
         spent = 0
-        while spent < _ITERATIONS_ALL:
+        for _ in range(_ROUNDS):
             limited = solver.limiting(torques)
             ended = self._ended(limited.cut(cuts), start)
             spent += ended.iterations
@@ -320,7 +321,7 @@ class MotionProgram:
                 best, inside = within, within.variables
             lost = within is None or within.loss - self.loss(ended.variables) > _LOST * solver.terms
             # Where it failed says nothing of where it was to go.
-            if not lost or not ended.settled:
+            if not lost or not ended.settled or spent >= _ITERATIONS_ALL:
                 break
             # It goes on from there, or one bound pushes it to where it is beyond another.
             start = ended.variables
