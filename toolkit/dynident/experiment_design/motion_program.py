@@ -1,8 +1,9 @@
 """The motion that tells the most within limits: a nonlinear program, solved by SLSQP.
 
 Variables are amplitudes; position, speed, acceleration and jerk are linear in them, and the torque
-is not. The limits hold on a grid of instants while the program is solved; then the motion is looked
-at on ten times as many, and made smaller about its centre until none is exceeded there.
+is not. Linear limits hold on a grid of instants while the program is solved. Then the motion is
+looked at on ten times as many: where it exceeds a limit of torque or leaves the workspace it is
+bounded there and solved again, and at last made smaller about its centre until nothing is exceeded.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import islice
 import numpy as np
 
 from dynident.errors import DesignError
-from dynident.experiment_design.geometry.workspace import Workspace
+from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits, above_instants
 from dynident.experiment_design.motion_solver import (
@@ -40,13 +41,13 @@ _NARROW_STARTS = 2
 wider laws leads to no better motions than as many searches from elsewhere do."""
 _ITERATIONS, _ITERATIONS_ALL = 150, 300  # of a search, and of all that go on from where one ended
 _ROUNDS = 12  # of these
-_SHRINKS = 100
+_SHRINKS, _LEAST_SHRINK = 100, 1.0 - 1e-3  # the latter of a motion that is just beyond
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _USUAL = 0.3  # of a random motion's size
 _NEAR = 0.7  # of a limit of torque, from which on the search imposes it from the beginning
 _LARGE = 0.5  # of a limit of torque, from which on an instant of such a joint counts
+_TIGHTER = 0.998  # of what is left of a limit of torque that turns out exceeded between instants
 _LOST = 0.02  # of a loss, for each logarithm that it sums, by making a motion smaller: no matter
-_ROUNDING = 1e-9
 
 
 def instants_of(motions: MotionFamily) -> int:
@@ -163,7 +164,7 @@ class MotionProgram:
                 # As if shares grew evenly from those at rest; those of torques grow faster.
                 more = used > 1.0
                 left = (1.0 - at_rest[more]) / (used[more] - at_rest[more])
-                found[:, 1:] *= (1.0 - _ROUNDING) * left.min()
+                found[:, 1:] *= min(left.min(), _LEAST_SHRINK)
             else:
                 found[:, 1:] *= 0.5
         return None
@@ -239,17 +240,21 @@ class MotionProgram:
         usual = motions.trajectory(motions.random(0) * _USUAL).at(t)
         return self.limits.torque * self.torque.certain(self.limits, t, *usual)
 
-    def _torques_beyond(self, variables: np.ndarray, share: float) -> set[tuple[float, int]]:
-        """Instants (s) and joints of large torques, of joints that exceed a share of their limit.
+    def _large_torques(self, variables: np.ndarray, joints: np.ndarray) -> set[tuple[float, int]]:
+        """Instants (s) at which the torques of some joints, (n,) mask, are large, and the joints.
 
-        Of these alone: what is limited where it peaks only, peaks elsewhere then; and of many rows
-        that are nearly the same from one instant to the next, SLSQP fails to make a step.
+        Where it peaks alone is not enough: then it peaks elsewhere. And of many rows that are
+        nearly the same from one instant to the next SLSQP fails to make a step.
         """
         t = self.motions.times(instants_of(self.motions))
         torque = self.torque.along(t, *self.motions.trajectory(variables).at(t))
-        used = np.abs(torque) / self._torque_left
-        large = (used > _LARGE) & (used.max(axis=0) > share)
+        large = (np.abs(torque) > _LARGE * self._torque_left) & joints
         return {(float(t[k]), int(j)) for k, j in np.argwhere(large)}
+
+    def _torque_shares(self, variables: np.ndarray) -> np.ndarray:
+        """The largest share of each limit of torque that a motion uses, (n,)."""
+        t, n = self.motions.times(FINER * instants_of(self.motions)), self.motions.n
+        return self._shares(variables, t)[3 * n : 4 * n]
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best motions that a few iterations make of random ones, within the limits."""
@@ -268,7 +273,8 @@ class MotionProgram:
         begins = list(islice(clear, _GLANCES * starts))
         short = self._solver(instants_of(self.motions), _GLANCE)
         for begin in tuple(begins):
-            torques = self._torques_beyond(begin.variables, _NEAR)
+            near = self._torque_shares(begin.variables) > _NEAR
+            torques = self._large_torques(begin.variables, near)
             begins += self._within(self._ended(short.limiting(torques), begin.variables))
         return sorted(begins, key=lambda one: one.loss)[:starts]
 
@@ -304,31 +310,37 @@ class MotionProgram:
         ----------
         solver : the search, of motions within linear limits. Where a motion is beyond those of
             torque, or out of the workspace, it is bounded there, and the search goes on.
-        start : (n, 1 + k).
+        start : (n, 1 + k), of a motion within all limits and in the workspace.
         """
-        torques, cuts = self._torques_beyond(start, _NEAR), []
-        fine, inside, best = self.motions.times(FINER * self.instants), start, None
-        spent = 0
+        torques = self._large_torques(start, self._torque_shares(start) > _NEAR)
+        room, cuts = np.ones(self.motions.n), []
+        inside, best, spent = start, None, 0
         for _ in range(_ROUNDS):
-            limited = solver.limiting(torques)
+            limited = solver.limiting(torques, room)
             ended = self._ended(limited.cut(cuts), start)
             spent += ended.iterations
             if not ended.settled and start is not inside:
                 ended = self._ended(limited.cut(cuts, inside), inside)
                 spent += ended.iterations
             (within,) = self._within(ended) or (None,)
-            if within is not None and (best is None or within.loss < best.loss):
-                best, inside = within, within.variables
             lost = within is None or within.loss - self.loss(ended.variables) > _LOST * solver.terms
-            # Where it failed says nothing of where it was to go.
-            if not lost or not ended.settled or spent >= _ITERATIONS_ALL:
+            if within is not None and (best is None or within.loss < best.loss):
+                best = replace(within, settled=ended.settled and not lost, iterations=spent)
+                inside = best.variables
+            if not lost or spent >= _ITERATIONS_ALL or not np.all(np.isfinite(ended.variables)):
                 break
             # It goes on from there, or one bound pushes it to where it is beyond another.
             start = ended.variables
-            more = self._torques_beyond(start, 1.0) - torques
-            position = self.motions.trajectory(start).at(fine)[0]
-            new = [] if self.workspace.is_free else self.workspace.cuts(fine, position)
-            if not more and not new:
+            shares = self._torque_shares(start)
+            beyond, new = shares > 1.0, self._cuts(start)
+            if not beyond.any() and not new:
                 break
-            torques, cuts = torques | more, cuts + new
+            room = np.where(beyond, room * _TIGHTER / np.maximum(shares, 1.0), room)
+            torques, cuts = torques | self._large_torques(start, beyond), cuts + new
         return [] if best is None else [best]
+
+    def _cuts(self, variables: np.ndarray) -> list[RoomCut]:
+        if self.workspace.is_free:
+            return []
+        t = self.motions.times(FINER * self.instants)
+        return self.workspace.cuts(t, self.motions.trajectory(variables).at(t)[0])

@@ -29,6 +29,7 @@ worst told pair does not need stood still: in `problems/which_of_two` three pair
 CENTRES = 0.999
 """Of half a joint's range: how far the centre of a motion may be from its middle."""
 _ROUNDING = 1e-6  # of what is left of a limit
+_LOOSEST = 1e-3  # tolerance of SLSQP, which is that of limits, too
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
 
 
@@ -151,11 +152,13 @@ class LimitedTorque:
         their slopes by q, v and a, (n, 3 n).
     grid : instants, each as often as torques are limited there.
     joints : (k,) whose torque is limited at each of them.
+    room : (k,) shares of the limits that are left there.
     """
 
     function: Any
     grid: MotionGrid
     joints: np.ndarray
+    room: np.ndarray
 
     def rows(self, variables: np.ndarray) -> Rows:
         """Return what a motion leaves of the limits.
@@ -171,7 +174,8 @@ class LimitedTorque:
         # CasADi has columns one below the other, and instants side by side.
         by_signals = slope.reshape(n, count, signals, n)[self.joints, each]
         found = np.einsum("tsj,sjtk->tjk", by_signals, self.grid.slopes)
-        return Rows.below_one(share[self.joints, each], found.reshape(count, -1))
+        of_room = found.reshape(count, -1) / self.room[:, None]
+        return Rows.below_one(share[self.joints, each] / self.room, of_room)
 
 
 def torque_shares(torque: Any, most: np.ndarray) -> Any:
@@ -260,18 +264,22 @@ class MotionSolver:
             iterations=iterations,
         )
 
-    def limiting(self, torques: Collection[tuple[float, int]]) -> MotionSolver:
+    def limiting(
+        self, torques: Collection[tuple[float, int]], room: np.ndarray | None = None
+    ) -> MotionSolver:
         """Return the search with limits on the torques of some joints at some instants alone.
 
         Parameters
         ----------
         torques : instants, in s, and joints.
+        room : (n,) shares of the limits that may be used; None for all of them.
         """
         if not torques:
             return replace(self, torque=None)
         times, joints = (np.array(one) for one in zip(*sorted(torques), strict=True))
         grid = MotionGrid.of(self.motions, times)
-        return replace(self, torque=LimitedTorque(self.shares, grid, joints))
+        left = np.ones(len(joints)) if room is None else room[joints]
+        return replace(self, torque=LimitedTorque(self.shares, grid, joints, left))
 
     def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray | None = None) -> MotionSolver:
         """Return the search with bounds on the position at single instants, too.
@@ -317,6 +325,8 @@ class MotionSolver:
         """
         from scipy.optimize import minimize
 
+        from dynident.nlp.ipopt import interruptible
+
         program = _Program(self, start)
         bound = np.full(start.shape, np.inf)
         bound[:, 0] = CENTRES
@@ -326,31 +336,35 @@ class MotionSolver:
             bounds = np.append(bounds, np.inf)
         spent = 0
         while True:
-            ended = minimize(
-                program.objective,
-                begin,
-                jac=True,
-                method="SLSQP",
-                bounds=np.column_stack([-bounds, bounds]),
-                constraints={"type": "ineq", "fun": program.left, "jac": program.slopes_left},
-                options={
-                    "maxiter": self.iterations - spent,
-                    "ftol": _SETTLED * self.terms / program.scale,
-                },
-            )
+            # CasADi turns a KeyboardInterrupt that arrives within it into another error.
+            with interruptible():
+                ended = minimize(
+                    program.objective,
+                    begin,
+                    jac=True,
+                    method="SLSQP",
+                    bounds=np.column_stack([-bounds, bounds]),
+                    constraints={"type": "ineq", "fun": program.left, "jac": program.slopes_left},
+                    options={
+                        "maxiter": self.iterations - spent,
+                        "ftol": min(_SETTLED * self.terms / program.scale, _LOOSEST),
+                    },
+                )
             spent += int(ended.nit)
-            if ended.success or program.lowest is None:
+            if ended.success:
                 x = ended.x
                 break
             # It fails where its idea of the curvature has gone wrong: from the best motion within
-            # limits it begins with none.
-            x, again = program.lowest, not np.array_equal(program.lowest, begin)
-            if spent >= self.iterations or not again:
+            # limits it begins with none. Where it found none it goes nowhere.
+            x = begin if program.lowest is None else program.lowest
+            if spent >= self.iterations or np.array_equal(x, begin):
                 break
             begin = x
+        variables = x[: start.size].reshape(start.shape)
+        losses = self.found_losses(variables).values
         return DesignedMotion(
-            variables=x[: start.size].reshape(start.shape),
-            loss=float(ended.fun),
+            variables=variables,
+            loss=joined(losses, float(losses.max())),
             status=str(ended.message),
             iterations=spent,
             settled=bool(ended.success),
