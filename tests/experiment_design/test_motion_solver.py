@@ -13,7 +13,12 @@ from dynident.experiment_design import MotionLimits
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
-from dynident.experiment_design.motion_solver import MotionSolver, torque_shares
+from dynident.experiment_design.motion_solver import (
+    DesignedMotion,
+    MotionSolver,
+    _Program,
+    torque_shares,
+)
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
@@ -70,6 +75,19 @@ def test_slopes_are_those_of_the_values(family: MotionFamily) -> None:
 
 
 @all_families
+@pytest.mark.parametrize("asked", [1, 3])
+def test_what_slsqp_is_given_has_the_slopes_of_its_values(family: MotionFamily, asked: int) -> None:
+    solver, start = solver_of(family, asked).limiting(PEAKS), 0.2 * family.random(5)
+    program = _Program(solver, start)
+    x = np.append(start.ravel(), [0.3] * program.several)
+    _, slopes = program.objective(x)
+    plain = differences(lambda at: np.array([program.objective(at)[0]]), x)
+    np.testing.assert_allclose(slopes, plain[0], atol=1e-6 * np.abs(plain).max())
+    plain = differences(program.left, x)
+    np.testing.assert_allclose(program.slopes_left(x), plain, atol=1e-6 * np.abs(plain).max())
+
+
+@all_families
 def test_linear_rows_leave_what_the_limits_leave(family: MotionFamily) -> None:
     solver, x, t = solver_of(family), 0.1 * family.random(3), family.times(12)
     q, v, a = family.trajectory(x).at(t)
@@ -89,8 +107,7 @@ def test_cuts_and_limited_torques_are_rows_at_their_instants(family: MotionFamil
     solver = solver_of(family).limiting(PEAKS)
     (cut,), motion = CUTS, family.trajectory(x)
     left = cut.slope @ motion.at(np.array([cut.t]))[0][0] - cut.least
-    inside = 0.2 * x / abs(left) if left < 0 else x
-    cutting = solver.cut(CUTS, inside)
+    cutting = solver.cut(CUTS, x)
     assert cutting.linear.at(x.ravel())[-1] == pytest.approx(left, abs=1e-12)
     assert len(cutting.linear.values) == len(solver.linear.values) + 1
     # A bound that a motion within the workspace does not meet is moved to where it does.
@@ -121,3 +138,14 @@ def test_a_search_ends_lower_and_within_its_rows(family: MotionFamily, asked: in
     assert limited.torque is not None
     assert limited.torque.rows(ended.variables).values.min() < -0.1
     assert limited.torque.rows(kept.variables).values.min() > -1e-3
+
+
+def test_a_motion_that_was_made_smaller_is_called_no_optimum() -> None:
+    """Whatever the solver said of the larger one."""
+    status = "Optimization terminated successfully"
+    ended = DesignedMotion(
+        variables=np.zeros((1, 2)), loss=0.0, status=status, iterations=7, settled=True
+    )
+    assert "at a local optimum (SLSQP: " in ended.ended_in_words
+    smaller = replace(ended, settled=False).ended_in_words
+    assert "short of a local optimum" in smaller and "made smaller" in smaller

@@ -47,7 +47,7 @@ class DesignedMotion:
     loss : see `MotionProgram.loss`.
     status : of SLSQP, in words, or `NOT_BETTER`.
     iterations : of SLSQP.
-    settled : whether it ended at a local optimum.
+    settled : whether it ended at a local optimum, and was not made smaller to be within limits.
     """
 
     variables: np.ndarray
@@ -63,6 +63,8 @@ class DesignedMotion:
             return f"The search for a better motion failed: {self.status}."
         where = "at" if self.settled else "short of"
         words = f"(SLSQP: {self.status}, {self.iterations} iterations)"
+        if not self.settled and self.status.startswith("Optimization terminated"):
+            words += ": to be within all limits it was made smaller"
         return f"The search ended {where} a local optimum {words}."
 
 
