@@ -335,7 +335,12 @@ def test_torques_that_turn_out_too_large_are_limited_then(monkeypatch) -> None:
     (ended,) = program.ends(program.solver(), start)
     torque = program.torque.along(t, *program.motions.trajectory(ended.variables).at(t))
     assert np.all(np.abs(torque).max(axis=0) <= limits.torque)
+    assert ended.settled and ended.iterations > 0
     monkeypatch.setattr(MotionSolver, "limiting", lambda solver, *_: solver)
+    # Of the motion without limits, at an optimum, what is made smaller is at none.
+    assert free.motion.settled
+    (whole,), (part,) = (one._within(free.motion) for one in (free.program, program))
+    assert whole.settled and not part.settled
     smaller = program.ends(program.solver(), start)
     worse = min([program.loss(start), *(one.loss for one in smaller)])
     assert ended.loss < worse - 0.1

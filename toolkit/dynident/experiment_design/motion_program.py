@@ -24,6 +24,7 @@ from dynident.experiment_design.motion_solver import (
     DesignedMotion,
     MotionSolver,
     joined,
+    terms_of,
     torque_shares,
 )
 from dynident.experiment_design.motions.motion_family import MotionFamily
@@ -198,8 +199,9 @@ class MotionProgram:
 
         Parameters
         ----------
-        starts : how many random motions the search begins at.
-        seed : of these.
+        starts : how many searches there are, of each question but narrow ones, which have twice as
+            many.
+        seed : of the random motions that they begin with.
         progress : is called with what is being done.
 
         Raises
@@ -279,11 +281,22 @@ class MotionProgram:
         return sorted(begins, key=lambda one: one.loss)[:starts]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
-        """The motion, made smaller until it is within all limits; none where that fails."""
+        """The motion, made smaller until it is within all limits; none where that fails.
+
+        Where that costs it much, it is at no optimum any more.
+        """
         if not np.all(np.isfinite(motion.variables)):
             return []
         best = self.within(motion.variables)
-        return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
+        if best is None:
+            return []
+        found = replace(motion, variables=best, loss=self.loss(best))
+        return [replace(found, settled=motion.settled and not self._is_worse(found, motion))]
+
+    def _is_worse(self, smaller: DesignedMotion, motion: DesignedMotion) -> bool:
+        """Whether a motion has lost much by being made smaller."""
+        lost = smaller.loss - self.loss(motion.variables)
+        return lost > _LOST * terms_of(self.informations)
 
     def _ended(self, solver: MotionSolver, start: np.ndarray) -> DesignedMotion:
         """Where a search ends, each joint whose range the motion fits into moved to within that.
@@ -323,11 +336,10 @@ class MotionProgram:
                 ended = self._ended(limited.cut(cuts, inside), inside)
                 spent += ended.iterations
             (within,) = self._within(ended) or (None,)
-            lost = within is None or within.loss - self.loss(ended.variables) > _LOST * solver.terms
             if within is not None and (best is None or within.loss < best.loss):
-                best = replace(within, settled=ended.settled and not lost, iterations=spent)
-                inside = best.variables
-            if not lost or spent >= _ITERATIONS_ALL or not np.all(np.isfinite(ended.variables)):
+                best, inside = replace(within, iterations=spent), within.variables
+            done = within is not None and not self._is_worse(within, ended)
+            if done or spent >= _ITERATIONS_ALL or not np.all(np.isfinite(ended.variables)):
                 break
             # It goes on from there, or one bound pushes it to where it is beyond another.
             start = ended.variables

@@ -205,6 +205,11 @@ def joined(losses: Sequence[float] | np.ndarray, largest: float) -> float:
     return losses[0] if len(losses) == 1 else largest + _OTHERS * float(np.mean(losses))
 
 
+def terms_of(informations: Sequence[Information]) -> int:
+    """Return how many logarithms the loss of some questions is the sum of."""
+    return max(one.terms for one in informations)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MotionSolver:
     """The search, to be started anywhere.
@@ -260,7 +265,7 @@ class MotionSolver:
             motions=motions,
             grid=grid,
             losses=tuple(one.loss_function(evaluated) for one in informations),
-            terms=max(one.terms for one in informations),
+            terms=terms_of(informations),
             linear=_linear_rows(motions, limited),
             shares=shares,
             iterations=iterations,

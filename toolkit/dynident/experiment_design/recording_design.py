@@ -241,6 +241,7 @@ class RecordingDesign(Shown):
             "separations": [one.to_dict() for one in self.separations],
             "least_distance": self.least_distance,
             "status": self.motion.status,
+            "settled": self.motion.settled,
         }
 
 
