@@ -88,17 +88,39 @@ def test_what_slsqp_is_given_has_the_slopes_of_its_values(family: MotionFamily, 
 
 
 @all_families
-def test_linear_rows_leave_what_the_limits_leave(family: MotionFamily) -> None:
+def test_rows_leave_what_the_limits_leave(family: MotionFamily) -> None:
     solver, x, t = solver_of(family), 0.1 * family.random(3), family.times(12)
     q, v, a = family.trajectory(x).at(t)
     half = (LIMITS.upper - LIMITS.lower) / 2
     jerk = family.jerk(x, family.to_the_end(12))[:, 1] / LIMITS.jerk[1]
     shares = [(q - LIMITS.lower) / half - 1.0, v / LIMITS.speed, a / LIMITS.acceleration]
     whole = np.concatenate([*(one.T.ravel() for one in shares), jerk])
-    left, found = np.concatenate([1 - whole, 1 + whole]), solver.linear.at(x.ravel())
+    left, found = np.concatenate([1 - whole, 1 + whole]), solver.limits.at(x.ravel())
     # Rows that no variable moves, as of the speed where a motion begins, may be left out.
     left, found = (np.sort(one[np.abs(one - 1.0) > 1e-9]) for one in (left, found))
     np.testing.assert_allclose(found, left, atol=1e-9)
+
+
+@all_families
+def test_limits_are_imposed_at_some_instants_and_where_they_turn_out_exceeded(
+    family: MotionFamily,
+) -> None:
+    solver, x = solver_of(family), family.random(3).ravel()
+    rows, imposed = solver.limits, np.count_nonzero(solver.imposed)
+    assert imposed == pytest.approx(len(rows.values) / 3, rel=0.15)
+    assert len(solver.linear.values) == imposed
+    # Of each joint and limit, on both sides: none is without a row.
+    used = np.abs(rows.slopes[solver.imposed]).sum(axis=0).reshape(family.n, family.size)
+    assert np.all(used > 0)
+    x *= 0.99 / (1.0 - rows.at(x).min())
+    within = x.reshape(family.n, -1)
+    assert solver.imposing(within) is solver
+    more = solver.imposing(1.05 * within)
+    left = rows.at(1.05 * x)
+    assert more.linear.at(1.05 * x).min() == pytest.approx(left.min())
+    assert left.min() < 0.0
+    # Nothing is left to impose there: it is itself.
+    assert more.imposing(1.05 * within) is more
 
 
 @all_families

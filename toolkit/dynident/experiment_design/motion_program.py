@@ -343,6 +343,10 @@ class MotionProgram:
                 break
             # It goes on from there, or one bound pushes it to where it is beyond another.
             start = ended.variables
+            wider = solver.imposing(start)
+            if wider is not solver:
+                solver = wider
+                continue  # torques of a motion that is too fast say nothing
             shares = self._torque_shares(start)
             beyond, new = shares > 1.0, self._cuts(start)
             if not beyond.any() and not new:

@@ -3,9 +3,10 @@
 There are few variables (nine or so a joint) and thousands of limits, nearly all of them linear, of
 which few are used at the end. That is what a method of active sets is for: on the arm of
 `problems/seven_joint_arm` SLSQP tells joint zero from spring better after 48 iterations in 1.2 s
-than Ipopt after 150 in 14 s. Torques are not linear, and rows of them at all instants, which are
-nearly the same from one to the next, made SLSQP fail in one of four searches: they are limited
-where they turn out too large.
+than Ipopt after 150 in 14 s. Its time grows with the rows that it is given, and so it is
+given the linear ones of a third of the instants, and more where a motion turns out too large.
+Torques are not linear, and rows of them at all instants, which are nearly the same from one to the
+next, made SLSQP fail in one of four searches: they are limited where they turn out too large, too.
 """
 
 from __future__ import annotations
@@ -29,6 +30,11 @@ worst told pair does not need stood still: in `problems/which_of_two` three pair
 CENTRES = 0.999
 """Of half a joint's range: how far the centre of a motion may be from its middle."""
 _ROUNDING = 1e-6  # of what is left of a limit
+_EACH = 3
+"""Of so many instants a search begins with the limits at one: between them there may be a sixth
+more. With eight harmonics of seven joints it takes two thirds of the time, with the two rounds or
+three that follow, and ends as low."""
+_CLOSE = 0.8  # share of a limit from which on it is imposed where others turn out exceeded
 _LOOSEST = 1e-3  # tolerance of SLSQP, which is that of limits, too
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
 
@@ -221,20 +227,24 @@ class MotionSolver:
     losses : casadi.Function of each question: q, v, a and the time at all instants, to the loss and
         its slopes by them.
     terms : logarithms that the loss is the sum of.
-    linear : rows of position, speed, acceleration and jerk.
+    limits : rows of position, speed, acceleration and jerk at all instants.
+    imposed : (r,) which of them are.
     shares : of torques, see `LimitedTorque.function`.
     iterations : at most.
     torque : that is limited, if any is.
+    cuts : bounds on positions, if there are any.
     """
 
     motions: MotionFamily
     grid: MotionGrid
     losses: tuple[Any, ...]
     terms: int
-    linear: Rows
+    limits: Rows
+    imposed: np.ndarray
     shares: Any
     iterations: int
     torque: LimitedTorque | None = None
+    cuts: Rows | None = None
 
     @classmethod
     def of(
@@ -257,19 +267,40 @@ class MotionSolver:
 
         Returns
         -------
-        The solver, which limits no torque yet.
+        The solver, which limits no torque yet, and all else at some of the instants.
         """
         evaluated, count = instants
         grid, limited = (MotionGrid.of(motions, motions.times(one)) for one in (evaluated, count))
+        rows, imposed = _linear_limits(motions, limited)
         return cls(
             motions=motions,
             grid=grid,
             losses=tuple(one.loss_function(evaluated) for one in informations),
             terms=terms_of(informations),
-            linear=_linear_rows(motions, limited),
+            limits=rows,
+            imposed=imposed,
             shares=shares,
             iterations=iterations,
         )
+
+    @property
+    def linear(self) -> Rows:
+        """What is imposed and is linear in the variables."""
+        limits = Rows(self.limits.values[self.imposed], self.limits.slopes[self.imposed])
+        return limits if self.cuts is None else Rows.joined([limits, self.cuts])
+
+    def imposing(self, variables: np.ndarray) -> MotionSolver:
+        """Return the search with more limits where a motion exceeds some; itself where none is.
+
+        Parameters
+        ----------
+        variables : (n, k).
+        """
+        left = self.limits.at(variables.ravel())
+        more = self.imposed | (left < 1.0 - _CLOSE)
+        if left.min() >= -_LOOSEST or np.array_equal(more, self.imposed):
+            return self
+        return replace(self, imposed=more)
 
     def limiting(
         self, torques: Collection[tuple[float, int]], room: np.ndarray | None = None
@@ -306,8 +337,7 @@ class MotionSolver:
         least = np.array([one.least - one.slope @ grid.middle for one in cuts])
         if inside is not None:
             least = np.minimum(least, slopes @ inside.ravel())
-        rows = Rows(-least, slopes)
-        return replace(self, linear=Rows.joined([self.linear, rows]))
+        return replace(self, cuts=Rows(-least, slopes))
 
     def found_losses(self, variables: np.ndarray) -> Rows:
         """Return the loss of each question, and their slopes.
@@ -387,6 +417,7 @@ class _Program:
 
     def __init__(self, solver: MotionSolver, start: np.ndarray) -> None:
         self._solver, self._shape, self._size = solver, start.shape, start.size
+        self._linear = solver.linear
         self.several = len(solver.losses) > 1
         self._at: dict[str, tuple[bytes, Rows]] = {}
         self.lowest: np.ndarray | None = None
@@ -409,7 +440,7 @@ class _Program:
 
     def left(self, x: np.ndarray) -> np.ndarray:
         """What is left of each limit."""
-        found = [self._solver.linear.at(x[: self._size])]
+        found = [self._linear.at(x[: self._size])]
         if self._solver.torque is not None:
             found.append(self._once("torque", self._solver.torque.rows, x).values)
         if self.several:
@@ -421,7 +452,7 @@ class _Program:
 
     def slopes_left(self, x: np.ndarray) -> np.ndarray:
         """Slopes of `left`."""
-        found = [self._solver.linear.slopes]
+        found = [self._linear.slopes]
         if self._solver.torque is not None:
             found.append(self._once("torque", self._solver.torque.rows, x).slopes)
         if not self.several:
@@ -439,8 +470,11 @@ class _Program:
         return self._at[name][1]
 
 
-def _linear_rows(motions: MotionFamily, grid: MotionGrid) -> Rows:
-    """Rows of position, speed, acceleration and jerk; their values where all variables are zero."""
+def _linear_limits(motions: MotionFamily, grid: MotionGrid) -> tuple[Rows, np.ndarray]:
+    """Rows of position, speed, acceleration and jerk, and which of them a search begins with.
+
+    The values of the rows are those where all variables are zero.
+    """
     limits = motions.limits
     most = np.array([(limits.upper - limits.lower) / 2, limits.speed, limits.acceleration])
     shares = list(grid.slopes / most[:, :, None, None])
@@ -449,12 +483,15 @@ def _linear_rows(motions: MotionFamily, grid: MotionGrid) -> Rows:
         of_jerk = np.zeros((motions.n, *basis.shape))
         of_jerk[limited] = (limits.speed / limits.jerk)[limited, None, None] * basis
         shares.append(of_jerk)
-    blocks = []
-    for share in shares:
+    blocks, begun = [], []
+    for kind, share in enumerate(shares):
         whole = np.zeros((*share.shape[:2], motions.n, motions.size))
         for j, one in enumerate(share):
             whole[j, :, j] = one
         blocks.append(whole.reshape(-1, motions.n * motions.size))
-    slopes = np.concatenate(blocks)
-    slopes = slopes[np.any(slopes != 0, axis=1)]  # at rest, where a motion begins
-    return Rows.below_one(np.zeros(len(slopes)), slopes)
+        # Of each joint and limit at other instants.
+        begun.append((np.indices(share.shape[:2]).sum(axis=0) + kind).ravel() % _EACH == 0)
+    slopes, first = np.concatenate(blocks), np.concatenate(begun)
+    moving = np.any(slopes != 0, axis=1)  # at rest, where a motion begins
+    rows = Rows.below_one(np.zeros(np.count_nonzero(moving)), slopes[moving])
+    return rows, np.tile(first[moving], 2)

@@ -89,7 +89,10 @@ class Sampled:
     @cached_property
     def counting(self) -> np.ndarray:
         """Rows that count at each joint, (T, n) mask: not those around its stops."""
-        found = np.ones((self.count, self.recording.n), dtype=bool)
+        shape = self.count, self.recording.n
+        if not any(map(len, self.recording.stops)):
+            return np.broadcast_to(True, shape)  # one number: no memory
+        found = np.ones(shape, dtype=bool)
         for j, stops in enumerate(self.recording.stops):
             begun = np.searchsorted(stops[:, 0], self.t, side="right") - 1
             over = self.t > np.append(stops[:, 1], -np.inf)[begun]
