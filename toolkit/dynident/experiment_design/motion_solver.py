@@ -3,10 +3,11 @@
 There are few variables (nine or so a joint) and thousands of limits, nearly all of them linear, of
 which few are used at the end. That is what a method of active sets is for: on the arm of
 `problems/seven_joint_arm` SLSQP tells joint zero from spring better after 48 iterations in 1.2 s
-than Ipopt after 150 in 14 s. Its time grows with the rows that it is given, and so it is
-given the linear ones of a third of the instants, and more where a motion turns out too large.
-Torques are not linear, and rows of them at all instants, which are nearly the same from one to the
-next, made SLSQP fail in one of four searches: they are limited where they turn out too large, too.
+than Ipopt after 150 in 14 s. Its time grows with the square of the variables, and with the rows:
+where there are many variables it is given the limits of a third of the instants, and others where a
+motion turns out too large. Torques are not linear, and rows of them at all instants, which are
+nearly the same from one to the next, made SLSQP fail in one of four searches: they are limited
+where they turn out too large, too.
 """
 
 from __future__ import annotations
@@ -30,10 +31,12 @@ worst told pair does not need stood still: in `problems/which_of_two` three pair
 CENTRES = 0.999
 """Of half a joint's range: how far the centre of a motion may be from its middle."""
 _ROUNDING = 1e-6  # of what is left of a limit
+_MANY = 120  # variables
 _EACH = 3
-"""Of so many instants a search begins with the limits at one: between them there may be a sixth
-more. With eight harmonics of seven joints it takes two thirds of the time, with the two rounds or
-three that follow, and ends as low."""
+"""Of so many instants a search for many variables begins with the limits at one; between them there
+may be a sixth more. With seven joints of 14 harmonics (189 variables) all parameters take 48 s in
+place of 86, of 20 harmonics 131 s in place of more than 280, and losses are as low; with 8 (105
+variables) and fewer nothing is gained."""
 _CLOSE = 0.8  # share of a limit from which on it is imposed where others turn out exceeded
 _LOOSEST = 1e-3  # tolerance of SLSQP, which is that of limits, too
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
@@ -483,15 +486,17 @@ def _linear_limits(motions: MotionFamily, grid: MotionGrid) -> tuple[Rows, np.nd
         of_jerk = np.zeros((motions.n, *basis.shape))
         of_jerk[limited] = (limits.speed / limits.jerk)[limited, None, None] * basis
         shares.append(of_jerk)
-    blocks, begun = [], []
+    blocks, begun, each = [], [], _EACH if motions.n * motions.size > _MANY else 1
     for kind, share in enumerate(shares):
         whole = np.zeros((*share.shape[:2], motions.n, motions.size))
         for j, one in enumerate(share):
             whole[j, :, j] = one
         blocks.append(whole.reshape(-1, motions.n * motions.size))
-        # Of each joint and limit at other instants.
-        begun.append((np.indices(share.shape[:2]).sum(axis=0) + kind).ravel() % _EACH == 0)
-    slopes, first = np.concatenate(blocks), np.concatenate(begun)
+        # Of each joint and limit at other instants; and at both ends, where the jerk leaps.
+        first = (np.indices(share.shape[:2]).sum(axis=0) + kind) % each == 0
+        first[:, [0, -1]] = True
+        begun.append(first.ravel())
+    slopes, imposed = np.concatenate(blocks), np.concatenate(begun)
     moving = np.any(slopes != 0, axis=1)  # at rest, where a motion begins
     rows = Rows.below_one(np.zeros(np.count_nonzero(moving)), slopes[moving])
-    return rows, np.tile(first[moving], 2)
+    return rows, np.tile(imposed[moving], 2)
