@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import OptimizeResult, minimize
 
 from chains import chain_text
 from dynident.experiment_design import MotionLimits
@@ -168,6 +169,31 @@ def test_a_search_ends_lower_and_within_its_rows(family: MotionFamily, asked: in
     assert limited.torque is not None
     assert limited.torque.rows(ended.variables).values.min() < -0.1
     assert limited.torque.rows(kept.variables).values.min() > -1e-3
+
+
+def test_where_slsqp_fails_it_begins_anew_at_the_best_motion_so_far(monkeypatch) -> None:
+    solver, begins = replace(solver_of(FAMILIES[0]), iterations=200), []
+
+    def failing(function, begin, *, options, **given):
+        begins.append(np.array(begin))
+        if len(begins) > 1:
+            return minimize(function, begin, options=options, **given)
+        found = minimize(function, begin, options={**options, "maxiter": 2}, **given)
+        return OptimizeResult(found, x=np.full_like(begin, np.nan), success=False)
+
+    start = 0.05 * FAMILIES[0].random(4)
+    plain = solver.ended(start)
+    monkeypatch.setattr("scipy.optimize.minimize", failing)
+    ended = solver.ended(start)
+    assert len(begins) == 2 and ended.settled
+    assert np.all(np.isfinite(ended.variables))
+    losses = [
+        float(solver.found_losses(x.reshape(start.shape)).values.max())
+        for x in (*begins, ended.variables)
+    ]
+    assert losses == sorted(losses, reverse=True) and losses[1] < losses[0] - 0.5
+    assert ended.loss == pytest.approx(plain.loss, abs=0.2)
+    assert ended.iterations > 2
 
 
 def test_a_motion_that_was_made_smaller_is_called_no_optimum() -> None:

@@ -126,22 +126,23 @@ def left_of_each_unit(
     """
     whole = np.array(similarity, order="F")
     whole[np.diag_indices_from(whole)] += 1.0
-    factorised, inverted = get_lapack_funcs(("potrf", "potri"), (whole,))
-    inverse, status = factorised(whole, lower=1, overwrite_a=1)
+    factorised, inverted, solved = get_lapack_funcs(("potrf", "trtri", "posv"), (whole,))
+    (product,) = get_blas_funcs(("trmv",), (whole,))
+    # Of the inverse of the whole its blocks alone are needed: products of that of its factor.
+    factor, status = factorised(whole, lower=1, overwrite_a=1)
     if status == 0:
-        inverse, status = inverted(inverse, lower=1, overwrite_c=1)
+        factor, status = inverted(factor, lower=1, overwrite_c=1)
     if status != 0:
         raise FitError("a kernel regression on the residual is singular")
-    # Only the lower triangle is one, of the whole and of its blocks.
-    (product,) = get_blas_funcs(("symv",), (inverse,))
-    (solved,) = get_lapack_funcs(("posv",), (inverse,))
-    weights, left = product(1.0, inverse, residual, lower=1), np.empty_like(residual)
+    weights = product(factor, product(factor, residual, lower=1), lower=1, trans=1)
     if not np.all(np.isfinite(weights)):
         raise FitError("a kernel regression on the residual is not finite")
+    left = np.empty_like(residual)
     for unit in units:
         out = unit.left_out
+        part = factor[out[0] :, out]  # above it is zero
         # Thousands of small systems: checks of their numbers would take longer than they do.
-        _, predicted, status = solved(inverse[np.ix_(out, out)], weights[out], lower=1)
+        _, predicted, status = solved(part.T @ part, weights[out], lower=1)
         if status != 0:
             raise FitError("a kernel regression on a part of the residual is singular")
         left[unit.rows] = predicted[np.searchsorted(out, unit.rows)]
