@@ -89,6 +89,16 @@ def test_a_longer_recording_takes_no_more_memory(model: Model, long: Recording) 
     assert peaks[1] < 1.2 * peaks[0]
 
 
+def test_rows_that_all_count_take_no_memory(long: Recording) -> None:
+    counting = sample(long, None).counting
+    assert counting.shape == (sample(long, None).count, 2) and counting.all()
+    assert counting.strides == (0, 0)
+    stopped = long.replace(stops=(np.array([[3.0, 4.0]]), np.zeros((0, 2))))
+    some, t = sample(stopped, None).counting, sample(stopped, None).t
+    np.testing.assert_array_equal(some[:, 0], (t < 3.0) | (t > 4.0))
+    assert some[:, 1].all()
+
+
 def test_memory_that_does_not_suffice_is_told_in_one_line(model: Model, long: Recording) -> None:
     class Greedy:
         name: ClassVar[str] = "greedy"
