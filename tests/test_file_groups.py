@@ -57,6 +57,7 @@ def killed(folder: Path, line: int) -> bool:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+@pytest.mark.slow
 def test_a_kill_at_any_line_loses_nothing(tmp_path: Path, monkeypatch) -> None:
     # The disk may take its time: a kill takes from no file what is written.
     monkeypatch.setattr(os, "fsync", lambda _: None)

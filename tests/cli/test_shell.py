@@ -67,6 +67,7 @@ def test_a_fit_loads_only_what_it_uses(tmp_path):
     assert "scipy" in packages and not packages & HEAVY
 
 
+@pytest.mark.slow
 def test_errors_reach_the_shell(tmp_path):
     path = write_study(tmp_path, edited(('"viscous_friction"', '"viscous"')))
     before = listing(tmp_path)

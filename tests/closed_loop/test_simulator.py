@@ -202,6 +202,7 @@ def test_compiled_force_is_the_effects_force(name: str) -> None:
                 np.testing.assert_allclose(rate, body.memory_rate(*instant)[0], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_effects_that_do_not_run_on_symbols_are_simulated_all_the_same(monkeypatch) -> None:
     robot = arm()
     truth = truth_of("quadratic_drag", robot)

@@ -78,6 +78,7 @@ def test_masses_out_of_the_box_are_seen(seed):
 
 @settings(max_examples=60)
 @given(SEEDS)
+@pytest.mark.slow
 def test_mended_links_are_whole(seed):
     """With the numbers that the mend states, every rule holds; and a whole link needs no mend."""
     rng = np.random.default_rng(seed)

@@ -79,6 +79,7 @@ def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Dia
         in_full("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
     ],
 )
+@pytest.mark.slow
 def test_a_hidden_effect_is_found_and_the_error_falls_to_the_floor(
     model: Model, hidden: str, values: dict[str, float]
 ) -> None:
@@ -136,6 +137,7 @@ def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None
     assert "beyond the noise" in found.sentence
 
 
+@pytest.mark.slow
 def test_beside_a_payload_that_was_found_the_search_for_what_is_left_goes_on(model: Model) -> None:
     train, test = recordings(model, "payload", PAYLOAD, **NOISE)
     train, test = (Dataset(tuple(map(strange, part))) for part in (train, test))

@@ -98,6 +98,7 @@ def test_explain_begins_again_where_a_gain_made_up_for_others(tmp_path: Path) ->
     np.testing.assert_allclose(gains, GAINS[1], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_gains_stay_where_nothing_was_added() -> None:
     model, amperes = recordings()
     problem, drives = first_gains()

@@ -91,6 +91,7 @@ def test_what_a_recording_is_to_tell_of_a_load_is_what_it_tells() -> None:
     assert not np.isfinite(found.sigma(None)).any()
 
 
+@pytest.mark.slow
 def test_of_several_loads_the_one_that_tells_most_is_carried() -> None:
     friction, dry = (
         effects_of(f"{x}@elbow", ROBOT)[0] for x in ("load_friction", "coulomb_friction")
@@ -112,6 +113,7 @@ def test_of_several_loads_the_one_that_tells_most_is_carried() -> None:
     assert "1000" in str(found.load_table())
 
 
+@pytest.mark.slow
 def test_a_pair_that_no_motion_tells_does_not_choose_the_load() -> None:
     labels = "load_friction@elbow", "coulomb_friction@elbow", "viscous_friction@elbow"
     friction, dry, viscous = (effects_of(label, ROBOT)[0] for label in labels)

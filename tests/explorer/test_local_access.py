@@ -122,6 +122,7 @@ def test_a_study_that_was_changed_since_is_not_explored(tmp_path):
         explore(other)
 
 
+@pytest.mark.slow
 def test_what_a_study_may_run_it_may_when_it_is_read_again(tmp_path, monkeypatch):
     study, told = di.load(write_study(tmp_path), modules="run"), []
 

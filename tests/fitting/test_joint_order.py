@@ -26,6 +26,7 @@ def turned(data: Dataset) -> Dataset:
     return Dataset(recordings, data.filter, noise)
 
 
+@pytest.mark.slow
 def test_the_order_of_a_recordings_joints_changes_nothing() -> None:
     noise = Noise(np.array([1e-5, 2e-5]), np.array([0.1, 0.2]))
     train, test = recorded(0, noise), recorded(1, noise)
@@ -73,6 +74,7 @@ def test_joints_of_other_names_are_refused(use) -> None:
         use(MODEL, strange)
 
 
+@pytest.mark.slow
 def test_a_single_recording_is_data_enough() -> None:
     (train,), (test,) = recorded(5).recordings, recorded(6).recordings
     fit = di.fit(MODEL, train)

@@ -110,6 +110,7 @@ def test_one_line_or_a_right_answer(tried: Tried, case: tuple[str, str]) -> None
         assert re.search(expected.message, lines[0]) and len(lines[0]) < 700
 
 
+@pytest.mark.slow
 def test_a_case_that_waits_for_ever_fails_alone() -> None:
     """Sleep uses no processor time, of which alone the worker itself has a limit."""
     waits = "import time; print(end='[', flush=True); time.sleep(3600)"

@@ -49,6 +49,7 @@ def test_every_record_is_read_by_its_name() -> None:
     assert 550 < recordings[-1].rate_hz < 600 and 490 < recordings[0].rate_hz < 510
 
 
+@pytest.mark.slow
 def test_least_squares_loses_the_inertias_as_the_filter_is_opened() -> None:
     for name in cutoffs.INERTIAL:
         narrow, wide = least_squares()[name]

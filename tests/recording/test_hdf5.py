@@ -109,6 +109,7 @@ def refused(path, message):
     assert "\n" not in str(told.value) and path.name in str(told.value)
 
 
+@pytest.mark.slow
 def test_unusable_files_are_one_line(tmp_path):
     path, t = tmp_path / "bad.h5", np.arange(3.0)
     write_hdf5(path, {"t": t, "q.a": t, "tau.a": t[:2]})

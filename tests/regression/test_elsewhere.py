@@ -9,6 +9,7 @@ from typing import Any
 
 import cloudpickle
 import numpy as np
+import pytest
 from joblib import Parallel, delayed
 
 import dynident as di
@@ -20,6 +21,7 @@ def test_the_package_goes_by_its_name() -> None:
     assert pickle.loads(sent)() is di
 
 
+@pytest.mark.slow
 def test_statistics_of_other_processes_add_up() -> None:
     def of_piece(seed: int) -> di.regression.SecondMoments:
         rng = np.random.default_rng(seed)

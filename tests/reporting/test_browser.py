@@ -231,6 +231,7 @@ def test_who_cannot_see_or_point_can_read_it(which, browser, request):
     one.page.context.close()
 
 
+@pytest.mark.slow
 def test_the_page_of_a_validation(visit, tmp_path):
     assert_readable(visit(report(validation(), tmp_path / "loop.html"), PHONE))
 

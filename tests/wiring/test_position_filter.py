@@ -53,6 +53,7 @@ def test_missing_physics_is_not_laid_to_the_filter() -> None:
     assert check_wiring(MODEL, recorded(QUICK, filter, delayed)) == ()
 
 
+@pytest.mark.slow
 def test_no_effect_is_added_behind_a_filter_that_makes_it_up() -> None:
     """Of this healthy arm a joint that gives way used to be added."""
     data = recorded(QUICK, NARROW)

@@ -29,6 +29,7 @@ def doubts(found: Diagnosis) -> list[str]:
     return [note for note in found.notes if "coupled_motors" in note]
 
 
+@pytest.mark.slow
 def test_a_coupling_without_a_noise_floor_may_be_geometry() -> None:
     found = diagnosed("joint_coupling@shoulder:elbow", 0.5, period=None)
     assert "joint_coupling" in {step.effect.name for step in found.steps}

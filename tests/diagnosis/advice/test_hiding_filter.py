@@ -36,6 +36,7 @@ def recordings(seeds: range) -> Dataset:
 
 
 @pytest.mark.parametrize(("cutoff_hz", "hides"), [(1.5, True), (None, False)])
+@pytest.mark.slow
 def test_the_filter_is_named_before_the_pictures(cutoff_hz: float | None, hides: bool) -> None:
     train, test = recordings(range(2)), recordings(range(2, 3))
     filter = suited_filter(train.recordings)

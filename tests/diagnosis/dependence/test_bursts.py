@@ -160,6 +160,7 @@ def test_few_rows_and_nothing_left_say_nothing() -> None:
     assert not told(left(noise(4)[:50]))
 
 
+@pytest.mark.slow
 def test_without_a_noise_floor_knocks_are_told_and_are_no_noise() -> None:
     """Its test recording shows none, and its residual is as large as noise might be."""
     model = Model(arm()) + "viscous_friction" + "coulomb_friction"

@@ -281,6 +281,7 @@ def test_a_push_is_told_on_the_clock_of_its_recording() -> None:
 
 
 @pytest.mark.parametrize(("rate_hz", "cutoff_hz"), [(100.0, 8.0), (200.0, 5.0)])
+@pytest.mark.slow
 def test_what_a_filter_makes_up_at_the_ends_is_no_contact_though_a_study_keeps_it(
     rate_hz: float, cutoff_hz: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

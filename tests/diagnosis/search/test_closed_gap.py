@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dynident.diagnosis import diagnose
 from dynident.effects import effects_of
 from dynident.model import Model
@@ -9,6 +11,7 @@ from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_not_there_is_no_crash() -> None:
     """A study may say that a joint has one: its response is then taken at a gap that has closed."""
     given = Model(arm())

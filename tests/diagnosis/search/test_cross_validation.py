@@ -22,6 +22,7 @@ def test_the_p_value_of_ranks_is_that_of_scipy(blocks: int, worse: float) -> Non
     assert signed_rank(losses, least) == pytest.approx(expected.pvalue, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_blocks_that_are_alike_share_their_ranks() -> None:
     least = np.full(12, 4.0)
     losses = least + np.array([1.0, 1.0, -1.0, 2.0, 0.0, 0.0, 3.0, -2.0, 1.0, 5.0, 4.0, 1.0])

@@ -26,6 +26,7 @@ def deviations(hz: float, force_std: float) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_the_mass_is_right_though_friction_reverses_within_a_sample(monkeypatch) -> None:
     def size() -> float:
         return float(np.sqrt(np.mean(deviations(0.5, 0.02) ** 2)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from dynident.fitting import Estimate, LeastSquares, fit
 from dynident.model import Model
@@ -31,6 +32,7 @@ def off(found: Estimate) -> np.ndarray:
     return found.effect_values("base_tilt") - TILT
 
 
+@pytest.mark.slow
 def test_sigma_says_what_it_takes_for_granted_and_what_it_would_be_else() -> None:
     given = Model(TORSO) + "base_tilt"
     granted, known = [], []

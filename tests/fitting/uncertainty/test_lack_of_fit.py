@@ -54,6 +54,7 @@ def test_a_whole_model_is_not_rejected(seed: int) -> None:
     assert not found.headline and "colour" in found.words_of_sigma
 
 
+@pytest.mark.slow
 def test_friction_of_a_whole_model_turns_round_when_the_joint_does_behind_fine_encoders() -> None:
     """What repetitions have in common, behind the low-pass that suits and behind the usual one."""
     model, usual = lab.model(0.01), Filter(position_cutoff_hz=40.0, cutoff_hz=18.0, rate_hz=50.0)

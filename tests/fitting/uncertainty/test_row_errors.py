@@ -44,6 +44,7 @@ def test_white_unfiltered_noise_gives_the_ordinary_covariance(model: Model) -> N
     np.testing.assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 def test_behind_a_low_pass_variances_are_those_of_the_errors(model: Model) -> None:
     """Without the noise's colour they are too small by a third.
 

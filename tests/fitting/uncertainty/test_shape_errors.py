@@ -43,6 +43,7 @@ def of_size(one: Estimate) -> tuple[float, float]:
     return one.value(SIZE), float(one.sigma[one.names.index(SIZE)])
 
 
+@pytest.mark.slow
 def test_a_size_is_as_uncertain_as_its_shape_makes_it() -> None:
     """Few samples are so slow: with the speed as known, sigma is a sixth of what values scatter."""
     told = np.array([of_size(one) for one in estimates(0.012, LEVEL) if not one.trading_off])
