@@ -73,6 +73,7 @@ def test_robots_exist_and_their_first_values_fit_the_effects(joints: int) -> Non
         assert begin.most > 1
 
 
+@pytest.mark.slow
 def test_what_is_hidden_is_scaled_to_its_ratio_and_stays_out_of_the_data(tmp_path: Path) -> None:
     case = next(c for c in draw(0, 300) if c.joints == 2 and _hides(c, "joint_spring"))
     truth = make(case, tmp_path, TINY)

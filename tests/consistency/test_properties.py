@@ -126,6 +126,7 @@ def test_margins_agree_with_the_verdict_on_ten_parameters(seed):
 
 @settings(max_examples=60)
 @given(SEEDS, st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-2, 30.0]))
+@pytest.mark.slow
 def test_relative_margins_know_no_units(seed, length, mass):
     """The same robot in mm, or made of lead, is as near to impossible."""
     rng = np.random.default_rng(seed)

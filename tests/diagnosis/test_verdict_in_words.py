@@ -106,6 +106,7 @@ def test_what_cannot_be_told_apart_is_named_together_in_either_part() -> None:
 
 @pytest.mark.parametrize("noise", [True, False])
 @pytest.mark.parametrize("falls", [(6.0, 2.0), ()])
+@pytest.mark.slow
 def test_where_the_search_was_stopped_nothing_is_said_of_the_rest_of_the_catalogue(
     noise, falls
 ) -> None:

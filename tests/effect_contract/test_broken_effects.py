@@ -462,6 +462,7 @@ def test_every_rule_is_broken_by_somebody():
     assert {rule.name for rule in RULES} == {rule for rule, _, _ in BROKEN.values()}
 
 
+@pytest.mark.slow
 def test_the_effect_itself_is_sound():
     class SoundWave(Wave):
         name = "sound_wave"

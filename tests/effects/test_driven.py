@@ -80,6 +80,7 @@ def test_elasticity_is_what_the_loop_shows(joint: str, resonance: float, damping
 
 
 @pytest.mark.parametrize(("joint", "gap"), [("elbow", 6e-3), ("shoulder", 1e-2)])
+@pytest.mark.slow
 def test_backlash_is_what_the_loop_shows(joint: str, gap: float) -> None:
     (effect,) = effects_of(f"backlash@{joint}", ROBOT)
     assert (explained(effect.shaped(30.0, 0.15, share(joint)), gap) < 0.05).all()
@@ -199,6 +200,7 @@ def test_derivatives_between_samples_are_those_at_them() -> None:
             np.testing.assert_allclose(one, every[:, :, joint], atol=error)
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_a_motion_goes_with_it() -> None:
     samples = block(3)
     along.along_motion(samples)[1].by(0)

@@ -98,6 +98,7 @@ def test_changes_far_slower_than_the_session_are_one_ramp(warm: float) -> None:
     assert abs(score(wider, gain, beside, own, 1).drop) < 0.02 * true
 
 
+@pytest.mark.slow
 def test_friction_of_a_joint_that_warms_up_is_known_as_well_as_is_said() -> None:
     """Noise of encoders in the columns, times the whole torque, had been errors of many sigma."""
     hidden = at_shoulder("thermal_friction", true_model()).shaped(20.0)

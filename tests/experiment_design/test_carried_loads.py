@@ -62,6 +62,7 @@ def test_a_usual_load_is_a_body_at_the_centre_of_the_last_link() -> None:
     np.testing.assert_allclose(load[1:4] / load[0], link[1:4] / link[0])
 
 
+@pytest.mark.slow
 def test_what_a_recording_is_to_tell_of_a_load_is_what_it_tells() -> None:
     """Least squares of all recordings has the sigma that is predicted."""
     data = recorded()
@@ -165,6 +166,7 @@ def test_recordings_that_carry_a_load_are_refused_for_another() -> None:
         design(MODEL, marked, DesignTask(loads=(2.0,), **SHORT))
 
 
+@pytest.mark.slow
 def test_limits_of_torque_leave_room_for_another_centre() -> None:
     limits = MotionLimits.of(ROBOT)
     limits.torque[:] = 120.0, 25.0
@@ -180,6 +182,7 @@ def test_limits_of_torque_leave_room_for_another_centre() -> None:
         assert np.all(np.abs(torque).max(axis=0) <= limits.torque)
 
 
+@pytest.mark.slow
 def test_files_say_what_is_carried(tmp_path: Path) -> None:
     import dynident as di
     from dynident.closed_loop import load_experiment

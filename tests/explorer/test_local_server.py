@@ -47,6 +47,7 @@ def handlers() -> Iterator[None]:
 
 @pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no alarms here")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.slow
 def test_ctrl_c_is_not_lost_while_an_object_is_finalised(server, handlers):
     calls = []
 

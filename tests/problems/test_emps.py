@@ -96,6 +96,7 @@ def test_missing_data_is_said_with_the_ways_to_get_it(tmp_path, monkeypatch) -> 
 
 
 @needs_data
+@pytest.mark.slow
 def test_the_simulated_loop_is_as_near_to_the_record_as_the_published_one() -> None:
     found = closed_loop.loop_errors(closed_loop.load())
     for quantity, published in PUBLISHED["closed_loop"].items():

@@ -46,6 +46,7 @@ def with_true_effects(rigid: np.ndarray) -> Estimate:
     return replace(estimate(), values=values)
 
 
+@pytest.mark.slow
 def test_the_estimate_is_accurate_where_it_was_fitted_and_impossible() -> None:
     found, published = estimate(), PUBLISHED["least_squares"]
     assert (found.model.size, found.basis.rank) == (published["parameters"], published["rank"])

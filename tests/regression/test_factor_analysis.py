@@ -153,6 +153,7 @@ def test_maximum_likelihood_predicts_as_least_squares_from_any_start() -> None:
 
 
 @pytest.mark.parametrize("prior", [None, Gamma()])
+@pytest.mark.slow
 def test_without_input_noise_the_answer_goes_to_least_squares(prior: Gamma | None) -> None:
     rng = np.random.default_rng(4)
     X = rng.standard_normal((5000, 3))

@@ -141,6 +141,7 @@ def test_a_finger_scrolls_until_the_glass_is_chosen(visit, two_joints):
     one.assert_quiet()
 
 
+@pytest.mark.slow
 def test_only_the_joints_that_fail_are_unfolded(visit, seven_joints):
     shown = (
         "[...document.querySelectorAll('details.joint[open] summary strong')].map(n => n.innerText)"

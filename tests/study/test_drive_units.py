@@ -118,6 +118,7 @@ def test_torques_of_a_study_are_those_of_the_robot_alone_in_newton_metres(study)
     np.testing.assert_allclose(made.train.noise.torque_std, STD * made.drives.gains)
 
 
+@pytest.mark.slow
 def test_a_fit_prints_the_gains_first_and_has_their_errors(tmp_path: Path) -> None:
     path = written(tmp_path)
     done = CliRunner().invoke(commands, ["fit", str(path)])

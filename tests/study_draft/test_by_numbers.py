@@ -136,6 +136,7 @@ def test_positions_of_motors_and_of_the_tool_are_no_torques(order, copy: str) ->
     assert found[-2:] == ("tau.shoulder", "tau.elbow")
 
 
+@pytest.mark.slow
 def test_more_pairs_than_are_tried_are_said() -> None:
     blocks = table()
     rng = np.random.default_rng(0)

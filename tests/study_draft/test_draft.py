@@ -87,6 +87,7 @@ def test_units_signs_order_and_zeros_are_found_and_said(arm: Path, fault: str) -
     assert any(decision.subject in ("units and signs", "zeros", "t") for decision in said)
 
 
+@pytest.mark.slow
 def test_gears_that_are_given_bring_columns_to_the_joints_side(arm: Path) -> None:
     one, ratios = recording(1), np.array([32.0, -48.0])
     q, tau = one.q * ratios, one.tau / ratios
@@ -115,6 +116,7 @@ def test_held_commands_are_told_from_measured_torques(arm: Path) -> None:
     assert study.train.recordings[0].torque == "held_command"
 
 
+@pytest.mark.slow
 def test_recordings_are_held_out_by_name_or_by_turns(arm: Path) -> None:
     one = recording(1)
     folder = arm.parent
@@ -184,6 +186,7 @@ def test_recordings_in_our_own_names_need_no_columns(arm: Path) -> None:
     assert "columns" not in tomllib.loads(draft_study(arm, [path]).text(arm.parent))
 
 
+@pytest.mark.slow
 def test_files_without_a_header_are_told_by_their_numbers(arm: Path) -> None:
     one = recording(3)
     v = np.gradient(one.q, one.t, axis=0)

@@ -147,6 +147,7 @@ def test_a_heavy_wrist_shows_that_its_motor_turns_two_joints(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("turns", [-1.0, 1.0])
+@pytest.mark.slow
 def test_wiring_that_is_mended_after_a_coupling_takes_the_motors_along(
     tmp_path: Path, turns: float
 ) -> None:
@@ -236,6 +237,7 @@ def light_wrist(arm: Arm, share: float) -> str:
     return "".join(a + b for a, b in zip(parts, [*limits, ""], strict=True))
 
 
+@pytest.mark.slow
 def test_limits_of_speed_raise_a_question_where_a_wrist_is_light(tmp_path: Path) -> None:
     """They are no evidence by themselves: nothing changes until somebody answers."""
     arm = written(tmp_path, light_wrist(written(tmp_path, chain_text(N, 1), -1.0), 1.0), -1.0)
@@ -262,6 +264,7 @@ def test_limits_of_speed_raise_a_question_where_a_wrist_is_light(tmp_path: Path)
 
 
 @pytest.mark.parametrize("seed", [3, 6])
+@pytest.mark.slow
 def test_a_limit_that_is_too_low_makes_no_coupling(tmp_path: Path, seed: int) -> None:
     """The same light wrist whose motors turn one joint each, and a description 7 % too low."""
     first = written(tmp_path, chain_text(N, 1), 0.0, seed=seed)
@@ -272,6 +275,7 @@ def test_a_limit_that_is_too_low_makes_no_coupling(tmp_path: Path, seed: int) ->
     assert_same(arm.study(draft), arm)
 
 
+@pytest.mark.slow
 def test_limits_that_no_joint_comes_near_tell_nothing(tmp_path: Path) -> None:
     text = light_wrist(written(tmp_path, chain_text(N, 1), -1.0), 1.0)
     for kept, joints in (("1000", (0, 1, 2)), ("0.5", (0,))):  # not reached; not kept
@@ -293,6 +297,7 @@ def rewritten(arm: Arm, change: Callable[[dict[str, np.ndarray]], dict[str, np.n
     np.savez(arm.folder / "run.npz", **changed)
 
 
+@pytest.mark.slow
 def test_currents_of_two_motors_are_not_added_unasked(tmp_path: Path) -> None:
     """Each has a gain of its own: whoever knows these writes the sum."""
     arm = written(tmp_path, chain_text(N, 1), -1.0)

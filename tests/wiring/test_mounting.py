@@ -50,6 +50,7 @@ def stated(found: tuple[Fault, ...]) -> np.ndarray:
 
 @pytest.mark.parametrize("gravity", [WALL, CEILING, FREE_FALL])
 @pytest.mark.parametrize("joints", [3, 5])
+@pytest.mark.slow
 def test_a_gravity_along_an_axis_or_none_is_named_exactly(
     gravity: tuple[float, ...], joints: int
 ) -> None:

@@ -51,6 +51,7 @@ def drag(one: Recording) -> np.ndarray:
     return v * np.abs(v)
 
 
+@pytest.mark.slow
 def test_missing_physics_is_no_fault() -> None:
     """Large effects that the model lacks: springs, drag, a delay, another gain."""
     for change in (
@@ -222,6 +223,7 @@ def negated() -> di.diagnosis.Diagnosis:
     return di.diagnose(true_model(), train, test)
 
 
+@pytest.mark.slow
 def test_the_fault_is_the_answer_of_a_diagnosis() -> None:
     """All torques negated fit as well as before: only what the values mean shows it."""
     found = negated()

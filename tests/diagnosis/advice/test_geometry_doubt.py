@@ -37,6 +37,7 @@ def test_a_coupling_without_a_noise_floor_may_be_geometry() -> None:
     assert "goes with" in note and "may differ from the robot" in note
 
 
+@pytest.mark.slow
 def test_a_coupling_that_explains_all_but_noise_is_one() -> None:
     found = diagnosed("joint_coupling@shoulder:elbow", 0.5)
     assert found.verdict == "explained" and not doubts(found)

@@ -56,6 +56,7 @@ def asked(*records: ResidualRecord, noise_std: np.ndarray | None = None):
 ONE = record(11, {rough_friction: 0.6})
 
 
+@pytest.mark.slow
 def test_joints_where_only_noise_is_left_are_not_asked() -> None:
     (found,) = asked(ONE, noise_std=np.sqrt([0.4, 1.0]))
     assert (found.joint, found.whole) == ("shoulder", "systematic")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from dynident.diagnosis.dependence.joint_inputs import joint_inputs
 from dynident.diagnosis.dependence.motion_blocks import motion_blocks
@@ -31,6 +32,7 @@ def turning(seed: int) -> ResidualRecord:
     return replace(one, q=q, v=v, load=one.a, residual=residual, body=ROUND)
 
 
+@pytest.mark.slow
 def test_a_law_of_the_angle_is_found() -> None:
     one = turning(1)
     assert joints_turning_round((one,)).tolist() == [True, False]

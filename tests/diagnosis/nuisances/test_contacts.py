@@ -146,6 +146,7 @@ def uncertain(series: list[Repeated], k: int, start: int, stop: int) -> list[Rep
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_where_a_joint_sticks_there_is_no_contact_and_elsewhere_there_is(seed: int) -> None:
     """What dry friction does at rest is not the same in every repetition."""
     series = data(seed)
@@ -194,6 +195,7 @@ def test_the_scan_is_the_fit_at_every_row(lost: int) -> None:
         np.testing.assert_allclose(scanned(prepared, width)[100:600], exact, atol=0.01)
 
 
+@pytest.mark.slow
 def test_noise_behind_a_low_pass_stands_out_nowhere_around_instants_that_do_not_count() -> None:
     """Smooth noise is foretold by the samples before it: where these are missing it is not."""
     stops, low_pass = np.arange(20, INSTANTS - 20, 40), butter(4, 0.5, output="sos")

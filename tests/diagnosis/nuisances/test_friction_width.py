@@ -98,6 +98,7 @@ def test_where_nothing_repeats_a_width_is_taken_if_it_is_worth_its_price(
         assert worth > 2 * np.log(start.rows)
 
 
+@pytest.mark.slow
 def test_a_width_and_stribeck_friction_that_makes_up_for_it_are_told_apart() -> None:
     """With either held the other has its best value, and both are wrong."""
     stribeck = StribeckFriction("elbow").shaped(0.03)

@@ -48,6 +48,7 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.3, 0.7, 2.0])
+@pytest.mark.slow
 def test_rounding_in_the_mean_is_that_of_many_draws(noise: float) -> None:
     rng, steps = np.random.default_rng(5), np.array([1e-3, 0.0])
     q = np.column_stack([rng.uniform(-3e-3, 3e-3, 40), np.ones(40)])

@@ -145,6 +145,7 @@ def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
     assert note.startswith("shoulder and elbow stand still") and "of each joint's rows" in note
 
 
+@pytest.mark.slow
 def test_stops_are_seen_in_all_samples_of_a_fast_recording() -> None:
     """They are over in a few samples, if columns are evaluated at fewer."""
     fast = Dataset(tuple(record(seed, 0.01, rate_hz=5000.0) for seed in (0, 1)))

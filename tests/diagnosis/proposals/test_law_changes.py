@@ -30,6 +30,7 @@ def p_value(made, torque: str, shape: dict[str, float]) -> float:
 
 @pytest.mark.parametrize("runs", [1, 2])
 @pytest.mark.parametrize("torque", ["c*v*q", "c*v*q*v[shoulder]"])
+@pytest.mark.slow
 def test_what_a_right_law_leaves_is_noise(
     torque: str, runs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -64,6 +65,7 @@ def test_what_an_imitation_leaves_goes_with_its_signals(
     assert p < DEFAULTS.proposals.changes_level
 
 
+@pytest.mark.slow
 def test_a_law_of_another_form_is_not_enough() -> None:
     search, fitted = searched(recordings({"c*v*q*abs(q)": 3.0}))
     found = next(search.found(fitted)).proposal

@@ -25,6 +25,7 @@ def of_a_product() -> tuple[Proposal, ...]:
     return proposals({"c*v*q": 0.5})
 
 
+@pytest.mark.slow
 def test_a_hidden_law_is_proposed_with_its_coefficient() -> None:
     (found,) = of_a_product()
     assert (found.torque, found.effect.joint) == ("c*v*q", "elbow")
@@ -88,6 +89,7 @@ def test_waves_over_two_joints_are_found_whatever_their_phases(torque: str, befo
         assert sigma < 0.2
 
 
+@pytest.mark.slow
 def test_shapes_of_a_law_have_a_sigma_and_its_metric_is_made_once_where_they_hardly_move() -> None:
     made = recordings({"c*v*sin(2.4*q[shoulder])": 0.4})
     search, fitted = searched(made)

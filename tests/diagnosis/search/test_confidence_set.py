@@ -28,6 +28,7 @@ def test_what_is_clearly_worse_is_dropped_and_equals_stay_together() -> None:
     assert np.mean([one == (0, 1) for one in kept]) >= 0.8
 
 
+@pytest.mark.slow
 def test_the_best_is_kept_at_the_level_asked_for() -> None:
     kept = [
         0 in confidence_set(losses((0.0, 2.0, 4.0), seed), DEFAULTS.search) for seed in range(40)
@@ -88,6 +89,7 @@ def test_one_block_alone_decides_nothing() -> None:
     assert as_good_as_first(one, FEW) == (0, 1)
 
 
+@pytest.mark.slow
 def test_what_is_as_good_stays_however_unevenly_blocks_tell() -> None:
     """Two that are equally good; and the better one that is not first."""
     even = [of_uneven_blocks(seed, 0.0) for seed in range(60)]

@@ -56,6 +56,7 @@ def pair(seed: int, memory: float, missing: float) -> tuple[HeldOut, HeldOut]:
 
 @pytest.mark.parametrize("memory", [0.0, 12.0])
 @pytest.mark.parametrize("missing", [0.3, 3.0])
+@pytest.mark.slow
 def test_it_is_the_scatter_of_the_fall(memory: float, missing: float) -> None:
     """Over 300 records, of residuals that blocks share with their neighbours, too."""
     pairs = [pair(seed, memory, missing) for seed in range(300)]

@@ -49,6 +49,7 @@ def turned(k: float) -> tuple[Model, Dataset]:
 
 
 @pytest.mark.parametrize("k", [20.0, 100.0, 200.0, 321.0])
+@pytest.mark.slow
 def test_a_line_of_a_gears_fast_side_is_found_and_fitted(k: float) -> None:
     """Beyond the grid of what comes some dozens of times in a turn."""
     model, recordings = turned(k)

@@ -41,6 +41,7 @@ def diagnosed(true: Model = FULL, **changed: float) -> Diagnosis:
     return find(FULL, Dataset(each[:2]), Dataset(each[2:]), criteria=BRIEF)
 
 
+@pytest.mark.slow
 def test_a_model_without_residual_whose_friction_drives_a_joint_is_not_complete() -> None:
     found = diagnosed(Fv__elbow=-1.0, Fc__elbow=0.2)
     assert not found.steps and not found.wiring

@@ -239,6 +239,7 @@ def test_held_out_losses_are_those_of_regressions_without_the_block() -> None:
     assert with_effect == pytest.approx(np.zeros(BLOCKS), abs=1e-8 * without.sum())
 
 
+@pytest.mark.slow
 def test_held_out_gain_is_positive_for_what_is_there_and_not_for_what_is_not() -> None:
     def gain(value: float, seed: int) -> float:
         rows = Rows((value,), seed)

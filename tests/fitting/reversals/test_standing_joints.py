@@ -317,6 +317,7 @@ def stated(data: Dataset) -> Dataset:
     return replace(data, noise=Noise(np.full(2, 1e-5), np.full(2, 0.05)))
 
 
+@pytest.mark.slow
 def test_noise_in_the_rows_that_count_is_no_lack_of_fit() -> None:
     estimate = di.fit(sharp(), Dataset(tuple(repeated(seed) for seed in range(3))))
     assert estimate.standing == ("elbow",)

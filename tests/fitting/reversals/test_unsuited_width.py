@@ -17,6 +17,7 @@ HZ, FORCE_STD = 0.1, 0.2
 
 
 @pytest.mark.parametrize("hz", [0.05, HZ, 0.5])
+@pytest.mark.slow
 def test_a_width_that_suits_is_not_doubted(hz: float) -> None:
     for seed in range(SEEDS):
         assert NAMED not in di.fit(model(), recorded(hz, FORCE_STD, seed)).headline
@@ -26,6 +27,7 @@ def test_a_width_that_suits_is_not_doubted(hz: float) -> None:
     ("factor", "side"),
     [(0.02, "wider"), (0.1, "wider"), (0.5, "wider"), (1.5, "narrower"), (5, "narrower")],
 )
+@pytest.mark.slow
 def test_a_wrong_width_is_said_where_it_makes_friction_wrong(factor: float, side: str) -> None:
     errors = []
     for seed in range(SEEDS):

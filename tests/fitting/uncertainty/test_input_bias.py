@@ -68,6 +68,7 @@ def test_a_robot_that_follows_its_encoders_is_told_from_noise_in_the_columns() -
     assert "Fc@elbow" in found.headline and "position_cutoff_hz" not in found.headline
 
 
+@pytest.mark.slow
 def test_a_low_pass_that_hides_the_motion_is_not_called_a_trembling_robot() -> None:
     """Of a carriage whose encoder has no noise, and of one that trembles, a low-pass lower too."""
     data = carriage.recorded(0.5, 0.05, 0)

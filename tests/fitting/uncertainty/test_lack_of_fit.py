@@ -34,6 +34,7 @@ def test_a_missing_effect_is_said_in_the_first_line(rejected: Estimate, tmp_path
 
 
 @pytest.mark.parametrize("method", [Constrained(), IV(SwappedPeriods()), Regression("ridge")])
+@pytest.mark.slow
 def test_whatever_fitted_it_a_model_that_is_rejected_says_so(method: Method) -> None:
     found = fit(lab.model(), repeated(stribeck=0.4), method)
     assert "The model is rejected" in found.headline

@@ -32,6 +32,7 @@ def drawn(model: Model, clean: Recording, settings: Filter | None, seed: int) ->
     return Dataset((clean.replace(tau=clean.tau + noise),), settings)
 
 
+@pytest.mark.slow
 def test_white_unfiltered_noise_gives_the_ordinary_covariance(model: Model) -> None:
     """In the mean of noise draws, in every direction of the parameters."""
     truth = true_values(model, Fv__shoulder=0.5, Fv__elbow=0.2)

@@ -170,6 +170,7 @@ def test_a_body_that_cannot_be_comes_with_the_nearest_that_can() -> None:
     assert one.to_dict()["nearest_possible"]["certificate"]["optimal"]
 
 
+@pytest.mark.slow
 def test_noise_of_short_records_is_no_load_that_moves() -> None:
     """Of 3 s little is known in the band of the motion: it is large by chance."""
     short = [weighed(recorded(CRATE, motion(50 + seed, 3.0), seed)) for seed in range(12)]

@@ -39,7 +39,7 @@ class HeldOutUnit:
     Attributes
     ----------
     rows : that are predicted.
-    left_out : (>= rows) ascending, that are in no training set meanwhile: these and those near them.
+    left_out : (>= rows) ascending; in no training set meanwhile: these rows and those near them.
     """
 
     rows: np.ndarray
