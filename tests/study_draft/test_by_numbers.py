@@ -51,6 +51,7 @@ ORDERS = (
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=" ".join)
+@pytest.mark.slow
 def test_blocks_are_told_in_whatever_order(order: tuple[str, ...]) -> None:
     blocks = table()
     x = np.hstack([blocks[name] for name in order])
@@ -98,6 +99,7 @@ def test_what_is_no_motion_or_has_no_torque_is_refused() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
+@pytest.mark.slow
 def test_what_only_drifts_is_no_motion_and_no_torque(seed: int) -> None:
     rng, blocks = np.random.default_rng(seed), table()
     walks = np.cumsum(rng.normal(size=(len(blocks["t"]), 6)), axis=0)
@@ -122,6 +124,7 @@ def tool(q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("order", [("t", "q", "{}"), ("t", "q", "v", "{}"), ("t", "{}", "q")])
 @pytest.mark.parametrize("copy", ["motor", "tool"])
+@pytest.mark.slow
 def test_positions_of_motors_and_of_the_tool_are_no_torques(order, copy: str) -> None:
     blocks = table()
     rng = np.random.default_rng(0)

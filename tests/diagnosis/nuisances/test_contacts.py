@@ -84,6 +84,7 @@ def pushed(series: list[Repeated], k: int, p: int, time: float, width: float, he
 
 @pytest.mark.parametrize("kind", ["", "coloured", "slow"])
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -> None:
     time = 50.0 + STEP * INSTANTS * 2 + 1.7
     # Slow noise of the same size hides more.

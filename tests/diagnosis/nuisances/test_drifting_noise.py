@@ -41,6 +41,7 @@ def with_torque(made: Recording, more: np.ndarray) -> Recording:
 
 
 @pytest.mark.parametrize("repetitions", [2, 3, 8])
+@pytest.mark.slow
 def test_noise_alone_does_not_drift(repetitions: int) -> None:
     found = [drifts(*(recorded(2 * seed + k, repetitions) for k in (0, 1))) for seed in range(10)]
     assert found == [()] * 10
