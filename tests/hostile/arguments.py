@@ -24,7 +24,7 @@ KNOWN = {
     "unknown effect": (("add", "study.toml", "stribek_friction"), r"did you mean 'stribeck_frict"),
     "effect of an unknown joint": (
         ("add", "study.toml", "joint_spring@elbov"),
-        r"joint_spring@elbov: the robot has no joint 'elbov'. .*elbow",
+        r"joint_spring@elbov: the robot has no joint 'elbov'. did you mean 'elbow'",
     ),
     "payload that nothing carries": (
         ("add", "study.toml", "payload"),

@@ -56,7 +56,7 @@ KNOWN = {
     ),
     "misspelt joint of an effect": (
         edited(('"viscous_friction"', '"viscous_friction@elbo"')),
-        r"effects: viscous_friction@elbo: the robot has no joint 'elbo'. .*elbow",
+        r"effects: viscous_friction@elbo: the robot has no joint 'elbo'. did you mean 'elbow'",
     ),
     "effect twice": (
         edited(('"viscous_friction"', '"viscous_friction", "viscous_friction@elbow"')),

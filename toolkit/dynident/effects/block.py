@@ -10,6 +10,7 @@ import numpy as np
 from dynident.errors import EffectError
 from dynident.robot import Robot
 from dynident.robot.joint_derivatives import JointDerivatives
+from dynident.words import did_you_mean
 
 FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
@@ -67,7 +68,9 @@ class Block:
     def index(self, joint: str | None) -> int:
         """Column of a joint."""
         if joint not in self.names:
-            raise EffectError(f"no joint '{joint}'", remedy=f"joints: {', '.join(self.names)}")
+            valid = f"joints: {', '.join(self.names)}"
+            remedy = did_you_mean(str(joint), self.names, valid)
+            raise EffectError(f"no joint '{joint}'", remedy=remedy)
         return self.names.index(joint)
 
     def fitted_robot(self, label: str) -> Robot:

@@ -15,6 +15,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording.masks import within
 from dynident.settings import LONGEST_TIME
+from dynident.words import did_you_mean
 
 USES = ("train", "test")
 TORQUES = ("measured", "held_command")
@@ -236,9 +237,9 @@ class Recording:
         """
         missing = [joint for joint in joints if joint not in self.joints]
         if missing:
-            raise RecordingError(
-                f"no joint '{missing[0]}'", self.where, f"joints: {', '.join(self.joints)}"
-            )
+            valid = f"joints: {', '.join(self.joints)}"
+            remedy = did_you_mean(missing[0], self.joints, valid)
+            raise RecordingError(f"no joint '{missing[0]}'", self.where, remedy)
         picked = [self.joints.index(joint) for joint in joints]
         stops = tuple(self.stops[j] for j in picked) if self.stops else ()
         continuous = tuple(name for name in self.continuous if name in joints)

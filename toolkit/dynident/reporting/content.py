@@ -16,6 +16,7 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.maps import SPECTRA, ResidualMap
+from dynident.words import did_you_mean
 
 GIVEN = "model as given"
 BAND = "noise band"
@@ -183,7 +184,8 @@ def maps_of(diagnosis: Diagnosis, joint: str) -> tuple[ResidualMap, ...]:
     """
     known = [one.name for one in diagnosis.joints]
     if joint not in known:
-        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {', '.join(known)}")
+        remedy = did_you_mean(joint, known, f"joints: {', '.join(known)}")
+        raise DynidentError(f"no joint '{joint}'", remedy=remedy)
     found = tuple(one for one in diagnosis.maps if one.joint == joint)
     if not found:
         raise DynidentError("the diagnosis has no residual map of it", f"joint '{joint}'")
