@@ -3,11 +3,10 @@
 There are few variables (nine or so a joint) and thousands of limits, nearly all of them linear, of
 which few are used at the end. That is what a method of active sets is for: on the arm of
 `problems/seven_joint_arm` SLSQP tells joint zero from spring better after 48 iterations in 1.2 s
-than Ipopt after 150 in 14 s. Its time grows with the square of the variables, and with the rows:
-where there are many variables it is given the limits of a third of the instants, and others where a
-motion turns out too large. Torques are not linear, and rows of them at all instants, which are
-nearly the same from one to the next, made SLSQP fail in one of four searches: they are limited
-where they turn out too large, too.
+than Ipopt after 150 in 14 s. Its time grows with the rows: it may begin with the limits of some
+instants, and others come in where a motion turns out too large. Torques are not linear, and rows of
+them at all instants, which are nearly the same from one to the next, made SLSQP fail in one of four
+searches: they are limited where they turn out too large, too.
 """
 
 from __future__ import annotations
@@ -20,10 +19,14 @@ import numpy as np
 
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
+from dynident.experiment_design.motions.limited_motions import (
+    LimitedTorque,
+    MotionGrid,
+    Rows,
+    linear_limits,
+)
 from dynident.experiment_design.motions.motion_family import MotionFamily
-from dynident.late_modules import LateModule
 
-ca: Any = LateModule("casadi")
 _OTHERS = 0.2
 """Weight of the mean of several losses beside the largest. Of the largest alone, joints that the
 worst told pair does not need stood still: in `problems/which_of_two` three pairs were told by 15,
@@ -31,12 +34,6 @@ worst told pair does not need stood still: in `problems/which_of_two` three pair
 CENTRES = 0.999
 """Of half a joint's range: how far the centre of a motion may be from its middle."""
 _ROUNDING = 1e-6  # of what is left of a limit
-_MANY = 120  # variables
-_EACH = 3
-"""Of so many instants a search for many variables begins with the limits at one; between them there
-may be a sixth more. With seven joints of 14 harmonics (189 variables) all parameters take 48 s in
-place of 86, of 20 harmonics 131 s in place of more than 280, and losses are as low; with 8 (105
-variables) and fewer nothing is gained."""
 _CLOSE = 0.8  # share of a limit from which on it is imposed where others turn out exceeded
 _LOOSEST = 1e-3  # tolerance of SLSQP, which is that of limits, too
 _SETTLED = 1e-4  # change of a loss, a logarithm, at which the search ends, for each that it sums
@@ -75,132 +72,6 @@ class DesignedMotion:
         if not self.settled and self.status.startswith("Optimization terminated"):
             words += ": to be within all limits it was made smaller"
         return f"The search ended {where} a local optimum {words}."
-
-
-@dataclass(frozen=True, eq=False)
-class MotionGrid:
-    """Instants of a motion, and how it follows from its variables there.
-
-    Attributes
-    ----------
-    times : (T,) s.
-    middle : (n,) positions where all variables are zero.
-    slopes : of q, v and a of a joint by its own variables, (3, n, T, k).
-    """
-
-    times: np.ndarray
-    middle: np.ndarray
-    slopes: np.ndarray
-
-    @classmethod
-    def of(cls, motions: MotionFamily, times: np.ndarray) -> MotionGrid:
-        """Return the grid of some instants, (T,) s."""
-        limits = motions.limits
-        slopes = np.array([limits.speed[:, None, None] * one for one in motions.bases(times)[:3]])
-        slopes[0, :, :, 0] += (limits.upper - limits.lower)[:, None] / 2  # of the centre
-        return cls(times, (limits.lower + limits.upper) / 2, slopes)
-
-    def inputs(self, variables: np.ndarray) -> np.ndarray:
-        """Return q, v, a and the time at all instants, (3 n + 1, T).
-
-        Parameters
-        ----------
-        variables : (n, k).
-        """
-        signals = np.einsum("sjtk,jk->sjt", self.slopes, variables)
-        signals[0] += self.middle[:, None]
-        return np.vstack([*signals, self.times])
-
-    def along(self, by_inputs: np.ndarray) -> np.ndarray:
-        """Return the slopes of a number by the variables, (n k,), from those by the inputs.
-
-        Parameters
-        ----------
-        by_inputs : (3 n + 1, T).
-        """
-        of_signals = by_inputs[:-1].reshape(self.slopes.shape[:3])
-        return np.einsum("sjt,sjtk->jk", of_signals, self.slopes).ravel()
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Numbers that are to be positive, and their slopes.
-
-    Attributes
-    ----------
-    values : (r,).
-    slopes : (r, u) by the variables.
-    """
-
-    values: np.ndarray
-    slopes: np.ndarray
-
-    @classmethod
-    def below_one(cls, shares: np.ndarray, slopes: np.ndarray) -> Rows:
-        """Return what shares (r,) of limits leave of them, on both sides."""
-        return cls(np.concatenate([1.0 - shares, 1.0 + shares]), np.concatenate([-slopes, slopes]))
-
-    @classmethod
-    def joined(cls, rows: Sequence[Rows]) -> Rows:
-        """Return several as one."""
-        return cls(
-            np.concatenate([one.values for one in rows]),
-            np.concatenate([one.slopes for one in rows]),
-        )
-
-    def at(self, variables: np.ndarray) -> np.ndarray:
-        """Values of linear rows, whose `values` are those where all variables (u,) are zero."""
-        return self.values + self.slopes @ variables
-
-
-@dataclass(frozen=True, eq=False)
-class LimitedTorque:
-    """Shares of the limits of some torques at some instants.
-
-    Attributes
-    ----------
-    function : casadi.Function of q, v, a and the time at an instant: shares of the limits (n,), and
-        their slopes by q, v and a, (n, 3 n).
-    grid : instants, each as often as torques are limited there.
-    joints : (k,) whose torque is limited at each of them.
-    room : (k,) shares of the limits that are left there.
-    """
-
-    function: Any
-    grid: MotionGrid
-    joints: np.ndarray
-    room: np.ndarray
-
-    def rows(self, variables: np.ndarray) -> Rows:
-        """Return what a motion leaves of the limits.
-
-        Parameters
-        ----------
-        variables : (n, k).
-        """
-        signals, n, count, _ = self.grid.slopes.shape
-        along = self.function.map(count)(self.grid.inputs(variables))
-        share, slope = (np.array(one) for one in along)
-        each = np.arange(count)
-        # CasADi has columns one below the other, and instants side by side.
-        by_signals = slope.reshape(n, count, signals, n)[self.joints, each]
-        found = np.einsum("tsj,sjtk->tjk", by_signals, self.grid.slopes)
-        of_room = found.reshape(count, -1) / self.room[:, None]
-        return Rows.below_one(share[self.joints, each] / self.room, of_room)
-
-
-def torque_shares(torque: Any, most: np.ndarray) -> Any:
-    """Return the function of a `LimitedTorque`.
-
-    Parameters
-    ----------
-    torque : casadi.Function of q, v, a and the time at an instant: torques (n,).
-    most : (n,) N m or N; infinite where there is no limit.
-    """
-    x = ca.SX.sym("x", 3 * len(most) + 1)
-    share = ca.densify(torque(x) / ca.DM(most))
-    slope = ca.densify(ca.jacobian(share, x)[:, : 3 * len(most)])
-    return ca.Function("shares", [x], [share, slope])
 
 
 def joined(losses: Sequence[float] | np.ndarray, largest: float) -> float:
@@ -254,7 +125,7 @@ class MotionSolver:
         cls,
         motions: MotionFamily,
         informations: tuple[Information, ...],
-        instants: tuple[int, int],
+        instants: tuple[int, int, int],
         iterations: int,
         shares: Any,
     ) -> MotionSolver:
@@ -264,17 +135,18 @@ class MotionSolver:
         ----------
         motions : among which one is sought.
         informations : what is asked; of several, see `joined`.
-        instants : at which columns are evaluated, and at which limits are imposed.
+        instants : at which columns are evaluated, at which there are limits, and of how many of
+            these it is given the limits of one, see `imposing`.
         iterations : at most.
         shares : of torques, see `LimitedTorque.function`.
 
         Returns
         -------
-        The solver, which limits no torque yet, and all else at some of the instants.
+        The solver, which limits no torque yet.
         """
-        evaluated, count = instants
+        evaluated, count, each = instants
         grid, limited = (MotionGrid.of(motions, motions.times(one)) for one in (evaluated, count))
-        rows, imposed = _linear_limits(motions, limited)
+        rows, imposed = linear_limits(motions, limited, each)
         return cls(
             motions=motions,
             grid=grid,
@@ -471,32 +343,3 @@ class _Program:
         if self._at.get(name, (b"",))[0] != key:
             self._at[name] = key, work(x[: self._size].reshape(self._shape))
         return self._at[name][1]
-
-
-def _linear_limits(motions: MotionFamily, grid: MotionGrid) -> tuple[Rows, np.ndarray]:
-    """Rows of position, speed, acceleration and jerk, and which of them a search begins with.
-
-    The values of the rows are those where all variables are zero.
-    """
-    limits = motions.limits
-    most = np.array([(limits.upper - limits.lower) / 2, limits.speed, limits.acceleration])
-    shares = list(grid.slopes / most[:, :, None, None])
-    if (limited := np.flatnonzero(limits.jerk_limited)).size:
-        *_, basis = motions.bases(motions.to_the_end(len(grid.times)))
-        of_jerk = np.zeros((motions.n, *basis.shape))
-        of_jerk[limited] = (limits.speed / limits.jerk)[limited, None, None] * basis
-        shares.append(of_jerk)
-    blocks, begun, each = [], [], _EACH if motions.n * motions.size > _MANY else 1
-    for kind, share in enumerate(shares):
-        whole = np.zeros((*share.shape[:2], motions.n, motions.size))
-        for j, one in enumerate(share):
-            whole[j, :, j] = one
-        blocks.append(whole.reshape(-1, motions.n * motions.size))
-        # Of each joint and limit at other instants; and at both ends, where the jerk leaps.
-        first = (np.indices(share.shape[:2]).sum(axis=0) + kind) % each == 0
-        first[:, [0, -1]] = True
-        begun.append(first.ravel())
-    slopes, imposed = np.concatenate(blocks), np.concatenate(begun)
-    moving = np.any(slopes != 0, axis=1)  # at rest, where a motion begins
-    rows = Rows.below_one(np.zeros(np.count_nonzero(moving)), slopes[moving])
-    return rows, np.tile(imposed[moving], 2)
