@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +15,13 @@ import pytest
 from chains import chain
 from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
-from dynident.experiment_design import DesignTask, MotionLimits, design, design_question
+from dynident.experiment_design import (
+    DesignTask,
+    MotionLimits,
+    design,
+    design_question,
+    motion_program,
+)
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
@@ -346,6 +355,20 @@ def test_torques_that_turn_out_too_large_are_limited_then(monkeypatch) -> None:
     assert ended.loss < worse - 0.1
 
 
+def test_limits_that_a_search_begins_without_come_in_where_they_are_exceeded(monkeypatch) -> None:
+    whole = design(MODEL, recorded(), DesignTask(starts=1, harmonics=4))
+    monkeypatch.setattr(motion_program, "_MANY", 0)
+    program, start = whole.program, whole.usual
+    solver = program.solver()
+    assert not solver.imposed.all() and solver.imposed.any()
+    (ended,) = program.ends(solver, start)
+    assert program.excess(ended.variables, program.motions.times(2000)) <= 1.0
+    monkeypatch.setattr(MotionSolver, "imposing", lambda solver, _: solver)
+    (shrunk,) = program.ends(solver, start)
+    assert ended.loss < shrunk.loss - 0.5
+    assert ended.loss < whole.motion.loss + 1.0
+
+
 def test_loads_share_the_fit_of_what_was_recorded(recorded_fits: list[Model]) -> None:
     design(MODEL, recorded(), DesignTask(starts=1, harmonics=2, loads=(0.0, 1.0)))
     assert len(recorded_fits) == 1
@@ -470,3 +493,16 @@ def test_ranges_with_one_end_or_none() -> None:
     limits = MotionLimits.of(Robot.from_text(text))
     assert 0.2 < limits.lower[0] < limits.upper[0] < 1.2
     assert limits.torque[0] == np.inf
+
+
+@pytest.mark.slow
+def test_ctrl_c_arrives_whenever_it_is_pressed() -> None:
+    """Within CasADi it is another error, or none."""
+    data, task = recorded(), DesignTask(duration=4.0, starts=2)
+    for delay in np.linspace(0.02, 0.7, 20):
+        timer = threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt):
+            timer.start()
+            for _ in range(5):
+                design(MODEL, data, task)
+            timer.join()

@@ -51,7 +51,7 @@ __all__ = [
 
 TRACEBACK = "DYNIDENT_TRACEBACK"
 """Environment variable: what nobody has foreseen ends in Python's traceback, not in one line."""
-_SELDOM = 200_000
+_SELDOM = 50_000
 """Objects made anew after which the collector looks for cycles. Modules, being loaded, make many
 and leave none; a tenth of a short command was spent on looking."""
 

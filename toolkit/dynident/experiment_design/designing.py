@@ -68,6 +68,8 @@ def design(
         If no motion within the limits can be found, an effect depends on the past, or nothing that
         the robot can do shows what is asked.
     """
+    from dynident.nlp.ipopt import interruptible
+
     model = model.model if isinstance(model, Estimate) else model
     task = task or DesignTask()
     progress = progress or logged("designing")
@@ -76,16 +78,21 @@ def design(
     recorded = Dataset.of(recorded, model.robot.names)
     loads = tuple(dict.fromkeys(task.loads))
     fits = RecordedFits(recorded)
+
+    def of(one: DesignTask) -> RecordingDesign:
+        # CasADi turns a KeyboardInterrupt that arrives within it into another error.
+        with interruptible():
+            return _designed(model, fits, one, limits, progress)
+
     if len(loads) < 2:
-        return _designed(model, fits, task, limits, progress)
+        return of(task)
     found: list[RecordingDesign] = []
     tried: list[LoadTried] = []
     refused: list[DesignError] = []
     for load in loads:
         progress(f"with {load:g} kg on the last link")
-        with_load = replace(task, loads=(load,))
         try:
-            one = _designed(model, fits, with_load, limits, progress)
+            one = of(replace(task, loads=(load,)))
         except DesignError as error:  # a load may be too heavy
             tried.append(LoadTried(mass=load, why=str(error)))
             refused.append(error)

@@ -165,17 +165,16 @@ class MotionSolver:
         return limits if self.cuts is None else Rows.joined([limits, self.cuts])
 
     def imposing(self, variables: np.ndarray) -> MotionSolver:
-        """Return the search with more limits where a motion exceeds some; itself where none is.
+        """Return the search with more limits where a motion exceeds some that are not imposed.
 
         Parameters
         ----------
         variables : (n, k).
         """
         left = self.limits.at(variables.ravel())
-        more = self.imposed | (left < 1.0 - _CLOSE)
-        if left.min() >= -_LOOSEST or np.array_equal(more, self.imposed):
+        if left[~self.imposed].min(initial=0.0) >= -_LOOSEST:
             return self
-        return replace(self, imposed=more)
+        return replace(self, imposed=self.imposed | (left < 1.0 - _CLOSE))
 
     def limiting(
         self, torques: Collection[tuple[float, int]], room: np.ndarray | None = None
@@ -195,7 +194,7 @@ class MotionSolver:
         return replace(self, torque=LimitedTorque(self.shares, grid, joints, left))
 
     def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray | None = None) -> MotionSolver:
-        """Return the search with bounds on the position at single instants, too.
+        """Return the search with bounds on the position at single instants, and no others.
 
         Parameters
         ----------
@@ -204,7 +203,7 @@ class MotionSolver:
             room is not linear, is moved to where it does. None for bounds as they are.
         """
         if not cuts:
-            return self
+            return replace(self, cuts=None)
         grid = MotionGrid.of(self.motions, np.array([one.t for one in cuts]))
         slopes = np.array(
             [one.slope[:, None] * grid.slopes[0, :, k] for k, one in enumerate(cuts)]
@@ -248,8 +247,7 @@ class MotionSolver:
             bounds = np.append(bounds, np.inf)
         spent = 0
         while True:
-            # CasADi turns a KeyboardInterrupt that arrives within it into another error.
-            with interruptible():
+            with interruptible():  # it arrives now, and not as the design ends
                 ended = minimize(
                     program.objective,
                     begin,
