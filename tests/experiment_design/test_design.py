@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -495,8 +496,16 @@ def test_ranges_with_one_end_or_none() -> None:
     assert limits.torque[0] == np.inf
 
 
+@pytest.fixture
+def interrupts() -> Iterator[None]:
+    """Ctrl-C raises, as it does at a terminal; what runs in the background may ignore it."""
+    seen = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, seen)
+
+
 @pytest.mark.slow
-def test_ctrl_c_arrives_whenever_it_is_pressed() -> None:
+def test_ctrl_c_arrives_whenever_it_is_pressed(interrupts: None) -> None:
     """Within CasADi it is another error, or none."""
     data, task = recorded(), DesignTask(duration=4.0, starts=2)
     for delay in np.linspace(0.02, 0.7, 20):
