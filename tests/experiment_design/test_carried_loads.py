@@ -12,7 +12,7 @@ from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.carried_load import payload_effect, usual_load
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.design_files import write_design
 from dynident.experiment_design.telling.imitations import Imitations
 from dynident.experiment_design.virtual_recording import record_virtually

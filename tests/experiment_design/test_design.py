@@ -23,12 +23,12 @@ from dynident.experiment_design import (
     design_question,
     motion_program,
 )
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
+from dynident.experiment_design.columns.predicted_torque import PredictedTorque
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
 from dynident.experiment_design.motion_solver import MotionSolver
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
-from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.telling.separation import DECIDES
 from dynident.fitting.fit_model import fit
 from dynident.model import Model
@@ -101,7 +101,7 @@ def test_columns_are_those_of_the_model(label: str) -> None:
     np.testing.assert_allclose(torque, base.torque(block, values), atol=1e-9 * scale)
 
 
-def test_the_symbolic_loss_is_the_loss() -> None:
+def test_the_loss_of_a_search_is_the_loss_and_has_its_slopes() -> None:
     columns = ColumnFunction.of(MODEL, true_values(MODEL))
     count, some = columns.count, motions()
     rng = np.random.default_rng(0)
@@ -119,10 +119,30 @@ def test_the_symbolic_loss_is_the_loss() -> None:
         )
         t = some.times(40)
         q, v, a = some.trajectory(some.random(1) * 0.2).at(t)
-        instants = np.hstack([q, v, a, t[:, None]]).T
-        symbolic, _ = information.loss_function(len(t))(instants)
-        plain = information.loss(information.matrix(t, (q, v, a)))
-        assert float(symbolic) == pytest.approx(plain, rel=1e-6)
+        inputs = np.hstack([q, v, a, t[:, None]])
+        along = information.loss_along(len(t))
+        loss, slopes = along(inputs)
+        assert loss == pytest.approx(information.loss(information.matrix(t, (q, v, a))), rel=1e-6)
+        for _ in range(5):
+            way = rng.standard_normal(inputs.shape)
+            ahead, behind = (along(inputs + step * way)[0] for step in (1e-5, -1e-5))
+            assert (ahead - behind) / 2e-5 == pytest.approx(float(np.sum(slopes * way)), rel=1e-4)
+
+
+@pytest.mark.parametrize(("position", "known"), [(np.nan, 0.0), (0.3, -1e3)])
+def test_the_loss_of_no_information_is_no_number(position: float, known: float) -> None:
+    columns = ColumnFunction.of(MODEL, true_values(MODEL))
+    count = columns.count
+    information = Information(
+        columns=columns,
+        mix=np.eye(count),
+        last=1,
+        weight=np.ones(2),
+        prior=known * np.eye(count),
+        scale=np.ones(count),
+    )
+    loss, slopes = information.loss_along(5)(np.full((5, 7), position))
+    assert np.isnan(loss) and np.all(np.isnan(slopes[:, :-1]))
 
 
 def test_predicted_sigma_is_that_of_the_regression() -> None:

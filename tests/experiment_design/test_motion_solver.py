@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from chains import chain_text
 from dynident.experiment_design import MotionLimits
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_solver import (

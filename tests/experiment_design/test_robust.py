@@ -10,7 +10,7 @@ import pytest
 from dynident.effects import effects_of
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.design_question import DesignQuestion, RecordedFits
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.model import Model

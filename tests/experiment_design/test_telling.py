@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident.effects import effects_of
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.telling.imitations import Imitations, shapes_of
 from dynident.experiment_design.telling.separation import (
     ALIKE,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from designs_within_limits import Drawn, seen
+from dynident.experiment_design.columns.predicted_torque import SIGMAS, PredictedTorque
 from dynident.experiment_design.design_question import DesignQuestion, RecordedFits
 from dynident.experiment_design.motion_limits import above_instants
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
-from dynident.experiment_design.predicted_torque import SIGMAS, PredictedTorque
 from dynident.model import Model
 
 

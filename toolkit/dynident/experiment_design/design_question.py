@@ -12,11 +12,11 @@ import numpy as np
 from dynident.effects import Effect
 from dynident.errors import DesignError
 from dynident.experiment_design.carried_load import payload_effect, usual_load
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
+from dynident.experiment_design.columns.predicted_torque import PredictedTorque
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motions.motion_family import MotionFamily
-from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.telling.imitations import Imitations, TellingMoments, shapes_of
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit

@@ -9,6 +9,7 @@ import numpy as np
 
 from dynident.arguments import checked
 from dynident.errors import DesignError
+from dynident.experiment_design.columns.predicted_torque import WRONG
 from dynident.experiment_design.design_question import Asked, DesignQuestion, RecordedFits
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.geometry.clearance import Clearance
@@ -19,7 +20,6 @@ from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
-from dynident.experiment_design.predicted_torque import WRONG
 from dynident.experiment_design.recording_design import LoadTried, RecordingDesign
 from dynident.experiment_design.telling.separation import Separation, times_until
 from dynident.fitting.estimate import Estimate

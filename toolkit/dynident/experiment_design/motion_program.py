@@ -17,6 +17,7 @@ from itertools import islice
 import numpy as np
 
 from dynident.errors import DesignError
+from dynident.experiment_design.columns.predicted_torque import PredictedTorque
 from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits, above_instants
@@ -29,7 +30,6 @@ from dynident.experiment_design.motion_solver import (
 )
 from dynident.experiment_design.motions.limited_motions import torque_shares
 from dynident.experiment_design.motions.motion_family import MotionFamily
-from dynident.experiment_design.predicted_torque import PredictedTorque
 
 _PER_WAVE = 14  # instants
 _LEAST, _LEAST_NARROW = 64, 300

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from dynident.experiment_design.columns.mapped_function import MappedFunction
 from dynident.experiment_design.geometry.workspace import RoomCut
-from dynident.experiment_design.information import Information
+from dynident.experiment_design.information import Information, LossAlong
 from dynident.experiment_design.motions.limited_motions import (
     LimitedTorque,
     MotionGrid,
@@ -98,12 +99,11 @@ class MotionSolver:
     ----------
     motions : among which one is sought.
     grid : of the instants at which columns are evaluated.
-    losses : casadi.Function of each question: q, v, a and the time at all instants, to the loss and
-        its slopes by them.
+    losses : of each question.
     terms : logarithms that the loss is the sum of.
     limits : rows of position, speed, acceleration and jerk at all instants.
     imposed : (r,) which of them are.
-    shares : of torques, see `LimitedTorque.function`.
+    shares : see `torque_shares`.
     iterations : at most.
     torque : that is limited, if any is.
     cuts : bounds on positions, if there are any.
@@ -111,7 +111,7 @@ class MotionSolver:
 
     motions: MotionFamily
     grid: MotionGrid
-    losses: tuple[Any, ...]
+    losses: tuple[LossAlong, ...]
     terms: int
     limits: Rows
     imposed: np.ndarray
@@ -138,7 +138,7 @@ class MotionSolver:
         instants : at which columns are evaluated, at which there are limits, and of how many of
             these it is given the limits of one, see `imposing`.
         iterations : at most.
-        shares : of torques, see `LimitedTorque.function`.
+        shares : see `torque_shares`.
 
         Returns
         -------
@@ -150,7 +150,7 @@ class MotionSolver:
         return cls(
             motions=motions,
             grid=grid,
-            losses=tuple(one.loss_function(evaluated) for one in informations),
+            losses=tuple(one.loss_along(evaluated) for one in informations),
             terms=terms_of(informations),
             limits=rows,
             imposed=imposed,
@@ -191,7 +191,8 @@ class MotionSolver:
         times, joints = (np.array(one) for one in zip(*sorted(torques), strict=True))
         grid = MotionGrid.of(self.motions, times)
         left = np.ones(len(joints)) if room is None else room[joints]
-        return replace(self, torque=LimitedTorque(self.shares, grid, joints, left))
+        shares = MappedFunction(self.shares, len(times))
+        return replace(self, torque=LimitedTorque(shares, grid, joints, left))
 
     def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray | None = None) -> MotionSolver:
         """Return the search with bounds on the position at single instants, and no others.
@@ -223,8 +224,8 @@ class MotionSolver:
         inputs = self.grid.inputs(variables)
         found = [one(inputs) for one in self.losses]
         return Rows(
-            np.array([float(value) for value, _ in found]),
-            np.array([self.grid.along(np.array(slope)) for _, slope in found]),
+            np.array([value for value, _ in found]),
+            np.array([self.grid.along(slopes) for _, slopes in found]),
         )
 
     def ended(self, start: np.ndarray) -> DesignedMotion:

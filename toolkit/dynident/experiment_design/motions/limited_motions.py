@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynident.experiment_design.columns.mapped_function import MappedFunction
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.late_modules import LateModule
 
@@ -38,25 +39,26 @@ class MotionGrid:
         return cls(times, (limits.lower + limits.upper) / 2, slopes)
 
     def inputs(self, variables: np.ndarray) -> np.ndarray:
-        """Return q, v, a and the time at all instants, (3 n + 1, T).
+        """Return q, v, a and the time at all instants, (T, 3 n + 1).
 
         Parameters
         ----------
         variables : (n, k).
         """
-        signals = np.einsum("sjtk,jk->sjt", self.slopes, variables)
-        signals[0] += self.middle[:, None]
-        return np.vstack([*signals, self.times])
+        signals = np.einsum("sjtk,jk->tsj", self.slopes, variables)
+        signals[:, 0] += self.middle
+        return np.column_stack([signals.reshape(len(self.times), -1), self.times])
 
     def along(self, by_inputs: np.ndarray) -> np.ndarray:
         """Return the slopes of a number by the variables, (n k,), from those by the inputs.
 
         Parameters
         ----------
-        by_inputs : (3 n + 1, T).
+        by_inputs : (T, 3 n + 1).
         """
-        of_signals = by_inputs[:-1].reshape(self.slopes.shape[:3])
-        return np.einsum("sjt,sjtk->jk", of_signals, self.slopes).ravel()
+        signals, n, count, _ = self.slopes.shape
+        of_signals = by_inputs[:, :-1].reshape(count, signals, n)
+        return np.einsum("tsj,sjtk->jk", of_signals, self.slopes).ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +98,13 @@ class LimitedTorque:
 
     Attributes
     ----------
-    function : casadi.Function of q, v, a and the time at an instant: shares of the limits (n,), and
-        their slopes by q, v and a, (n, 3 n).
+    shares : see `torque_shares`, at these instants.
     grid : instants, each as often as torques are limited there.
     joints : (k,) whose torque is limited at each of them.
     room : (k,) shares of the limits that are left there.
     """
 
-    function: Any
+    shares: MappedFunction
     grid: MotionGrid
     joints: np.ndarray
     room: np.ndarray
@@ -116,23 +117,25 @@ class LimitedTorque:
         variables : (n, k).
         """
         signals, n, count, _ = self.grid.slopes.shape
-        along = self.function.map(count)(self.grid.inputs(variables))
-        share, slope = (np.array(one) for one in along)
+        share, slope = self.shares(self.grid.inputs(variables)[:, None])
         each = np.arange(count)
-        # CasADi has columns one below the other, and instants side by side.
-        by_signals = slope.reshape(n, count, signals, n)[self.joints, each]
+        by_signals = slope[each, :, self.joints].reshape(count, signals, n)
         found = np.einsum("tsj,sjtk->tjk", by_signals, self.grid.slopes)
         of_room = found.reshape(count, -1) / self.room[:, None]
-        return Rows.below_one(share[self.joints, each] / self.room, of_room)
+        return Rows.below_one(share[each, 0, self.joints] / self.room, of_room)
 
 
 def torque_shares(torque: Any, most: np.ndarray) -> Any:
-    """Return the function of a `LimitedTorque`.
+    """Return shares of the limits of torque (n,) and their slopes by q, v and a, (n, 3 n).
 
     Parameters
     ----------
     torque : casadi.Function of q, v, a and the time at an instant: torques (n,).
     most : (n,) N m or N; infinite where there is no limit.
+
+    Returns
+    -------
+    casadi.Function of the same.
     """
     x = ca.SX.sym("x", 3 * len(most) + 1)
     share = ca.densify(torque(x) / ca.DM(most))

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from dynident.effects import Effect, ShapeParameter
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.information import ROUNDING
 from dynident.experiment_design.telling.predictions import TellingForms
 from dynident.experiment_design.telling.separation import Told

@@ -11,6 +11,7 @@ import numpy as np
 from dynident.batch.newton_euler import regressor_equations, torque_equations
 from dynident.effects import Effect
 from dynident.errors import DesignError, DynidentError
+from dynident.experiment_design.columns.mapped_function import MappedFunction
 from dynident.late_modules import LateModule
 from dynident.model import Model
 from dynident.robot import Robot
@@ -107,9 +108,7 @@ class ColumnFunction:
         t : (T,) s.
         q, v, a : (T, n).
         """
-        inputs = np.hstack([q, v, a, t[:, None]]).T
-        found = np.array(self.function(inputs))
-        return found.reshape(self.count, len(t), self.n).transpose(1, 2, 0)
+        return _along(self.function, t, q, v, a)
 
     def torque_along(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
@@ -121,7 +120,14 @@ class ColumnFunction:
         t : (T,) s.
         q, v, a : (T, n).
         """
-        return np.array(self.torque(np.hstack([q, v, a, t[:, None]]).T)).T
+        return _along(self.torque, t, q, v, a)[:, 0]
+
+
+def _along(function: Any, t: np.ndarray, *motion: np.ndarray) -> np.ndarray:
+    """A function of an instant along a motion, (T, columns, rows)."""
+    inputs = np.hstack([*motion, t[:, None]])
+    (found,) = MappedFunction(function, len(t))(inputs[:, None])
+    return found
 
 
 def _robot(model: Model, values: np.ndarray) -> Robot:

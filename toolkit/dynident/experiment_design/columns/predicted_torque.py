@@ -13,7 +13,7 @@ import numpy as np
 
 from dynident.constraints import ParameterSpace
 from dynident.experiment_design.carried_load import payload_effect
-from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.columns.column_function import ColumnFunction
 from dynident.experiment_design.motion_limits import MotionLimits, above_instants
 from dynident.inertia import distance_rows
 from dynident.model import Model
