@@ -7,9 +7,6 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from browsers import BROWSER, PATIENCE
-from dynident.effects import known_effects
-
 # What a first example loads takes seconds, and machines differ: a deadline would test both.
 settings.register_profile("without deadlines", deadline=None)
 settings.load_profile("without deadlines")
@@ -27,6 +24,9 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(autouse=True)
 def catalogue_as_it_was():
     """Effects that a test defines join the catalogue for as long as it runs."""
+    # Loaded by the workers alone: pytest itself reads this file, and waits for them.
+    from dynident.effects import known_effects
+
     with known_effects.unchanged():
         yield
 
@@ -35,6 +35,8 @@ def catalogue_as_it_was():
 def browser(tmp_path_factory) -> Iterator:
     """Chromium. No longer than a file: the loop of events that drives it is the thread's only."""
     from playwright.sync_api import sync_playwright
+
+    from browsers import BROWSER, PATIENCE
 
     home = tmp_path_factory.mktemp("home")
     with sync_playwright() as driver:

@@ -133,6 +133,7 @@ def test_folders_of_the_user_stay(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.slow
 def test_who_changes_places_is_alone(tmp_path: Path, monkeypatch) -> None:
     """Another writer that ends while older files go waits, and its files are not among them."""
     put(tmp_path, OLD)

@@ -119,6 +119,7 @@ def test_a_peer_that_fails_says_its_last_words(
         Peer(script="silent.py").ask({})
 
 
+@pytest.mark.slow
 def test_what_a_benchmark_had_before_it_failed_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

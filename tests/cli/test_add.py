@@ -11,6 +11,7 @@ from dynident.study import load
 from study_files import STUDY, edited, listing
 
 
+@pytest.mark.slow
 def test_comments_and_order_stay(run, study, tmp_path):
     path = study()
     before = listing(tmp_path)
@@ -102,6 +103,7 @@ def test_payload_where_a_recording_carries_it(run, study):
     assert "payload" in load(path).model
 
 
+@pytest.mark.slow
 def test_explain_leaves_the_study_alone(run, study, tmp_path):
     path = study()
     before = listing(tmp_path)

@@ -23,6 +23,7 @@ def estimates(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_answer_is_json_and_a_page(run, estimates):
     page = estimates / "changes.html"
     old, new = estimates / "old.json", estimates / "new.json"
@@ -37,6 +38,7 @@ def test_the_answer_is_json_and_a_page(run, estimates):
         assert name in text
 
 
+@pytest.mark.slow
 def test_effects_that_one_of_them_has_alone_are_listed(run, estimates):
     page = estimates / "gone.html"
     files = [str(estimates / name) for name in ("old.json", "other.json")]

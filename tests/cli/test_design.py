@@ -49,6 +49,7 @@ def test_the_design_is_written_and_can_be_simulated(run, tmp_path) -> None:
     np.testing.assert_allclose(reference, table["q_ref.shoulder"][: len(reference)], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_designed_is_one_line(run, tmp_path) -> None:
     study = write_loop_study(tmp_path)
     for wrong in (

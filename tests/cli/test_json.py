@@ -104,6 +104,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         pytest.param("diagnose", REPEATED, "replicates", marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_diagnosis(run, study, tmp_path, command, text, source):
     path = study(text)
     before = listing(tmp_path)
@@ -120,6 +121,7 @@ def test_diagnosis(run, study, tmp_path, command, text, source):
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_nothing_missing(run, study):
     said = run("explain", study(NOTHING_MISSING), "--json").json
     check_diagnosis(said, "replicates")
@@ -139,6 +141,7 @@ def test_a_search_that_was_stopped_says_its_limit(run, study):
     assert said["verdict"] == "explained" and "limit" not in said
 
 
+@pytest.mark.slow
 def test_without_test_recordings(run, study):
     text = STUDY[: STUDY.rindex("[[recordings]]")]
     said = run("diagnose", study(text), "--json").json

@@ -72,6 +72,7 @@ def test_columns_of_a_sensor_go_by_other_names(run, folder: Path) -> None:
     assert f"no column 'wrench.{FRAME}.tz'" in done.err
 
 
+@pytest.mark.slow
 def test_one_load_under_study_needs_no_name(run, folder: Path) -> None:
     plain = STUDY.replace("[loads.crate]\n", "").replace('"crate"', "true")
     (folder / "study.toml").write_text(plain)

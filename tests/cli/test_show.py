@@ -26,6 +26,7 @@ def test_several_entries_of_one_file_are_one_line(run, study):
     assert one["duration"] == 16.0 and one["period"] is None
 
 
+@pytest.mark.slow
 def test_what_a_file_holds_and_is_not_read_is_said(run, study, tmp_path):
     path = study()
     lines = (tmp_path / "train.csv").read_text().splitlines()

@@ -177,6 +177,7 @@ def test_effects_that_fail_in_the_work_are_one_line(run, study, tmp_path, kind, 
 
 
 @pytest.mark.parametrize("hidden", ["true", "false"])
+@pytest.mark.slow
 def test_experiments_name_modules_too(run, study, tmp_path, hidden):
     study()
     put(tmp_path / "mine.py", SAG)

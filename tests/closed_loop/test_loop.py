@@ -217,6 +217,7 @@ def test_a_delayed_command_acts_when_it_arrives(late: float) -> None:
     np.testing.assert_allclose(run.torque[1:, 0], (late_by[1:] + late_by[:-1]) / 2, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_right_model_makes_the_loop_follow_and_a_wrong_one_less() -> None:
     robot = arm()
     heavy = robot.with_theta(1.5 * robot.theta)

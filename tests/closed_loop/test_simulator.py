@@ -253,6 +253,7 @@ def test_joint_order_does_not_matter() -> None:
     np.testing.assert_allclose(runs[1].u[:, ::-1], runs[0].u, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_accuracy_is_what_is_stated() -> None:
     robot = arm()
     truth = (

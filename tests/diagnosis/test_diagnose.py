@@ -108,6 +108,7 @@ def test_plain_friction_is_found_where_the_model_has_none(model: Model, name: st
     }
 
 
+@pytest.mark.slow
 def test_which_recordings_carry_the_payload_is_found_too(model: Model) -> None:
     found = diagnosed(model, "payload", PAYLOAD)
     assert any("Payload carried in: synthetic 1, synthetic 3" in note for note in found.notes)

@@ -61,6 +61,7 @@ def test_the_ends_are_the_model_as_given_and_the_final_one(found):
     assert [one.on for one in found.switches.choices] == list(product((False, True), repeat=2))
 
 
+@pytest.mark.slow
 def test_every_choice_is_the_fit_of_that_model(found, given):
     evidence = Evidence(given, gather(recordings(range(3)), DEFAULTS.noise), criteria=DEFAULTS)
     held = Evidence(given, gather(recordings([3]), DEFAULTS.noise), criteria=DEFAULTS)

@@ -101,6 +101,7 @@ def without(kind: str) -> None:
     known_effects.forget_module(catalogue()[kind].__module__)
 
 
+@pytest.mark.slow
 def test_an_estimate_says_what_is_missing(saved):
     assert di.load_estimate(saved).model.effects[-1].label == "cable_sag@elbow"
     without("cable_sag")
@@ -114,6 +115,7 @@ def test_an_estimate_says_what_is_missing(saved):
     assert "cable_sag@elbow" in di.load_estimate(saved).model
 
 
+@pytest.mark.slow
 def test_the_packages_own_need_no_origin(saved):
     own, foreign = json.loads(saved.read_text())["model"]["effects"][-2:]
     assert "origin" not in own

@@ -323,6 +323,7 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [{"harmonics": 4}, {"intervals": 8}])
+@pytest.mark.slow
 def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, Any], tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text("[joints.shoulder]\njerk = 12.0\n")
@@ -390,6 +391,7 @@ def test_limits_that_a_search_begins_without_come_in_where_they_are_exceeded(mon
     assert ended.loss < whole.motion.loss + 1.0
 
 
+@pytest.mark.slow
 def test_loads_share_the_fit_of_what_was_recorded(recorded_fits: list[Model]) -> None:
     design(MODEL, recorded(), DesignTask(starts=1, harmonics=2, loads=(0.0, 1.0)))
     assert len(recorded_fits) == 1

@@ -57,6 +57,7 @@ def test_they_begin_and_end_at_rest_and_are_linear_in_their_variables(intervals:
 
 
 @pytest.mark.parametrize("intervals", [4, 8, 24])
+@pytest.mark.slow
 def test_a_jerk_that_is_largest_where_the_period_ends_is_seen(intervals: int) -> None:
     """It ends at another jerk than it begins with, and after the last of evenly spaced instants."""
     limits = replace(MotionLimits.of(ROBOT), jerk=np.array([12.0, 20.0]))
@@ -95,6 +96,7 @@ def test_derivatives_are_those_of_the_position() -> None:
     np.testing.assert_allclose((after[1] - before[1]) / (2 * h), now[2], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_designed_spline_keeps_its_limits_and_tells_more_than_random_ones(found) -> None:
     program: MotionProgram = found.program
     t, limits = np.linspace(0.0, 6.0, 10 * FINER * program.instants), found.limits

@@ -42,6 +42,7 @@ def client(server) -> FlaskClient:
     return server.flask.test_client()
 
 
+@pytest.mark.slow
 def test_the_page_and_all_that_belongs_to_it_is_served_with_the_token(client, server, home):
     answer = client.get(f"/{server.token}/", headers=home)
     assert answer.status_code == 200

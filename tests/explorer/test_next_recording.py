@@ -70,6 +70,7 @@ def shown(server: LocalServer) -> str:
     return json.dumps(found)
 
 
+@pytest.mark.slow
 def test_a_design_is_shown_with_its_motion_and_what_it_settles(server, tmp_path):
     assert SENTENCE not in shown(server)
     write_design(tmp_path / "next", server.versions.latest().digest)
@@ -92,6 +93,7 @@ def _numbers(found) -> list[float]:
     return np.frombuffer(base64.b64decode(found["bdata"]), np.dtype(found["dtype"])).tolist()
 
 
+@pytest.mark.slow
 def test_what_it_says_may_be_old(server, tmp_path):
     write_design(tmp_path / "next", server.versions.latest().digest)
     (tmp_path / "study.toml").write_text(STUDY + "# another recording\n")
@@ -172,6 +174,7 @@ def test_a_folder_whose_name_is_no_text_hides_no_other(server, tmp_path):
     assert asked(server, f"/{server.motions}/caf%e9").status_code == 404
 
 
+@pytest.mark.slow
 def test_what_is_left_open_comes_with_the_command_that_designs(tmp_path, diagnosis):
     """Were drag as good as the friction that was found, a motion could tell them apart."""
     study = di.load(write_study(tmp_path))

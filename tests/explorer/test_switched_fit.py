@@ -114,6 +114,7 @@ def test_impossible_values_are_told(refitter, study):
     assert any(one.startswith("Fq = -") and "elbow" in one for one in said)
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_offered_first(diagnosis, study):
     choices = effect_choices(diagnosis, study)
     assert (choices[0].label, choices[0].group, choices[0].refusal) == (HIDDEN, "added", "")
@@ -122,6 +123,7 @@ def test_what_is_missing_is_offered_first(diagnosis, study):
     assert sum(one.group == "others" for one in choices) <= MOST_OTHERS
 
 
+@pytest.mark.slow
 def test_what_cannot_be_switched_on_says_why(diagnosis, study):
     candidates = [one for one in diagnosis.candidates if one.effect.name == "contact"]
     only = replace(diagnosis, steps=(), candidates=tuple(candidates))

@@ -87,6 +87,7 @@ def test_an_axis_that_truly_leans_is_no_rounding() -> None:
     assert leaning.nearly_hidden == ()
 
 
+@pytest.mark.slow
 def test_one_number_decides_for_structure_fit_and_diagnosis() -> None:
     fitted, told = fitted_and_told(EXACT)
     tolerances = {fitted.model.base.tolerance, fitted.basis.tolerance, told.after.basis.tolerance}

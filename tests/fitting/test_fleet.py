@@ -20,6 +20,7 @@ def even() -> Fleet:
     return fit_fleet(model(), robots())
 
 
+@pytest.mark.slow
 def test_equal_robots_are_told_no_differences(even: Fleet) -> None:
     assert even.differences == ()
     assert list(even.estimates) == list(NAMES)
@@ -89,6 +90,7 @@ def test_holm_by_hand() -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_one_robot_does_not_show_is_not_compared(even: Fleet) -> None:
     """A robot whose elbow stands still: the others' combinations shrink to what it shows."""
     data = robots()

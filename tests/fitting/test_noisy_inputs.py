@@ -238,6 +238,7 @@ def test_noise_of_another_model_is_refused() -> None:
         di.fit(model(), noisy(), di.Regression(Ridge()))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_estimator_itself_is_handed_out() -> None:
     method = di.Regression("factors", "encoders")
     found, estimate = method.regressor(model(), noisy()), di.fit(model(), noisy(), method)

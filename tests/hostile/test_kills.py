@@ -33,6 +33,7 @@ def disturbed(writer: Writer) -> Written:
     return written(writer, [*map(killed_within, LINES), no_room])
 
 
+@pytest.mark.slow
 def test_a_kill_leaves_the_old_or_the_new_and_no_kill_the_new(
     writer: Writer, disturbed: Written
 ) -> None:
@@ -42,6 +43,7 @@ def test_a_kill_leaves_the_old_or_the_new_and_no_kill_the_new(
     assert killed_after(writer, 0.05).lost == []
 
 
+@pytest.mark.slow
 def test_no_room_leaves_the_old_files_and_one_line(writer: Writer, disturbed: Written) -> None:
     full = disturbed.damage[-1]
     assert full.status == 2
@@ -74,6 +76,7 @@ def test_every_command_that_writes_is_among_those_that_are_killed() -> None:
     assert commands.commands.keys() == {one.split()[0] for one in named}
 
 
+@pytest.mark.slow
 def test_commands_that_name_no_file_to_write_leave_the_folder_as_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

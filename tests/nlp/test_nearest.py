@@ -14,6 +14,7 @@ from dynident.nlp import nearest_body
 
 
 @pytest.mark.parametrize("consistency", ["full", "semi"])
+@pytest.mark.slow
 def test_nearest_bodies_of_any_size_are_consistent_and_near(consistency) -> None:
     rng = np.random.default_rng(8)
     for _ in range(40):

@@ -254,6 +254,7 @@ def test_a_solver_prints_nothing(capfd) -> None:
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_ctrl_c_reaches_the_caller() -> None:
     x = Variable("x", 100, start=1.0)
     deep = x.symbol

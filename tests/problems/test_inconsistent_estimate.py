@@ -55,6 +55,7 @@ def test_the_estimate_is_accurate_where_it_was_fitted_and_impossible() -> None:
     assert found.error == pytest.approx(published["train_error"], rel=published["tolerance"])
 
 
+@pytest.mark.slow
 def test_on_another_motion_it_is_worse_than_the_data_sheet() -> None:
     base, published = study().model.base, PUBLISHED["data_sheet"]
     comparison = compare(

@@ -42,6 +42,7 @@ def test_joints_come_in_the_order_asked_for(arm, tmp_path, suffix):
     values=st.lists(st.floats(-0.9 * LARGEST, 0.9 * LARGEST), min_size=2, max_size=6),
     name=st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1),
 )
+@pytest.mark.slow
 def test_csv_keeps_any_double_and_any_name(tmp_path_factory, values, name):
     t = np.arange(len(values), dtype=float)
     recording = Recording(t * 1e-3, values, values[::-1], (name,))

@@ -99,6 +99,7 @@ def test_dates_are_a_clock(tmp_path: Path, kind: str) -> None:
     assert one.provenance.began == pytest.approx(1772705472.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_file_of_many_dates_is_read_in_pieces(tmp_path: Path) -> None:
     count = 120_000
     start = np.datetime64("2026-03-05T10:11:12.000000")

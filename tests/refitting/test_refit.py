@@ -142,6 +142,7 @@ def test_effects_that_are_not_given_are_fitted_within_their_bounds(study, folder
     assert np.all(given[20:] >= 0)
 
 
+@pytest.mark.slow
 def test_an_estimate_keeps_what_it_knows(study, folder):
     estimate = di.fit(study.model, study.train)
     estimate.save(folder / "fit.json")

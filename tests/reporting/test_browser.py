@@ -16,7 +16,7 @@ from dynident.tables import percent
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.slow]
 
 SMALLEST_TEXT = 12.0  # pixels
 
@@ -99,9 +99,7 @@ def assert_readable(one: Visit) -> None:
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
-@pytest.mark.parametrize(
-    "which", ["two_joints", pytest.param("seven_joints", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
 def test_it_is_readable(which, width, visit, request):
     one = visit(request.getfixturevalue(which), width)
     assert_readable(one)
@@ -141,7 +139,6 @@ def test_a_finger_scrolls_until_the_glass_is_chosen(visit, two_joints):
     one.assert_quiet()
 
 
-@pytest.mark.slow
 def test_only_the_joints_that_fail_are_unfolded(visit, seven_joints):
     shown = (
         "[...document.querySelectorAll('details.joint[open] summary strong')].map(n => n.innerText)"
@@ -190,13 +187,11 @@ def test_switching_an_effect_on_lets_the_error_fall(visit, two_joints):
     one.assert_quiet()
 
 
-@pytest.mark.slow
 def test_it_prints_on_less_than_ten_pages(visit, seven_joints):
     pdf = visit(seven_joints, DESK).page.pdf(format="A4", prefer_css_page_size=True)
     assert 1 < len(re.findall(rb"/Type\s*/Page\b", pdf)) < 10
 
 
-@pytest.mark.slow
 def test_pictures_are_lower_on_paper_and_as_before_afterwards(visit, two_joints):
     page = visit(two_joints, DESK).page
     before = page.evaluate(_DRAWN)
@@ -218,7 +213,6 @@ def test_pictures_are_lower_on_paper_and_as_before_afterwards(visit, two_joints)
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
 def test_who_cannot_see_or_point_can_read_it(which, browser, request):
     """With all that is folded open, less joints like others: of a page of its own."""
@@ -232,12 +226,10 @@ def test_who_cannot_see_or_point_can_read_it(which, browser, request):
     one.page.context.close()
 
 
-@pytest.mark.slow
 def test_the_page_of_a_validation(visit, tmp_path):
     assert_readable(visit(report(validation(), tmp_path / "loop.html"), PHONE))
 
 
-@pytest.mark.slow
 def test_hostile_names_stay_names(visit, tmp_path):
     names = ("a", "$x$ </script><img src=x onerror=alert(2)>")
     one = visit(report(diagnosis(names, samples=300), tmp_path / "report.html"), DESK)

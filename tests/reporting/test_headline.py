@@ -296,6 +296,7 @@ def test_rivals_of_what_was_added_are_told_with_the_recording_that_decides(six):
         assert not any("--design" in c for advice in next_steps(found) for c in advice.commands)
 
 
+@pytest.mark.slow
 def test_at_most_three_next_steps_are_unfolded(six):
     many = replace(six, noise_source="unknown", steps=six.steps * 4)
     advice = next_steps(many)

@@ -41,6 +41,7 @@ def jittered(seconds: float) -> Recording:
 
 
 @pytest.mark.parametrize("bad", [noisy(2e-3), jittered(4e-3)], ids=["encoders", "clock"])
+@pytest.mark.slow
 def test_noise_of_positions_asks_for_lower_cutoffs_which_bring_parameters_back(
     tmp_path: Path, bad: Recording
 ) -> None:

@@ -185,6 +185,7 @@ def renamed(columns: dict[str, np.ndarray], before: str) -> dict[str, np.ndarray
     return {name if name == "t" else before + name: x for name, x in columns.items()}
 
 
+@pytest.mark.slow
 def test_a_coupling_of_columns_with_long_names_is_written_as_it_is_read(tmp_path: Path) -> None:
     arm = written(tmp_path, chain_text(N, 1), -1.0)
     before = f"/{'left_arm_controller/' * 8}"
@@ -211,6 +212,7 @@ def test_names_that_no_expression_holds_are_refused(
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
 
 
+@pytest.mark.slow
 def test_motors_that_turn_one_joint_each_are_left_alone(tmp_path: Path) -> None:
     """The draft says how the other reading is written."""
     for seed in (1, 2):

@@ -76,6 +76,7 @@ def test_a_tilted_base_is_a_physical_effect() -> None:
     assert check_wiring(model(), data(tilted)) == ()
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_beside_it_is_named_too() -> None:
     def change(one: di.Recording) -> di.Recording:
         return one.replace(tau=one.tau * np.array([1.0, -1.0, 1.0]))

@@ -233,6 +233,7 @@ def test_the_fault_is_the_answer_of_a_diagnosis() -> None:
     assert said["what"] == "the signs of all torques are wrong" and said["evidence"]
 
 
+@pytest.mark.slow
 def test_the_report_says_it_first(tmp_path: Path) -> None:
     page = di.report(negated(), tmp_path / "report.html").read_text()
     assert page.index("signs of all torques") < page.index("Relative torque error")
@@ -252,6 +253,7 @@ def test_other_commands_say_it_too(
     assert "Wiring: the signs of all torques are wrong" in out
 
 
+@pytest.mark.slow
 def test_health_has_an_empty_list() -> None:
     found = di.diagnose(true_model(), Dataset((recording(0),)), Dataset((recording(1),)))
     assert found.to_dict()["wiring"] == [] and found.verdict != "unexplained"

@@ -51,6 +51,7 @@ def test_a_law_of_low_speeds_is_found_behind_friction_that_looks_wide() -> None:
     assert found.tried > 1.5 * alone.tried and not alone.remark
 
 
+@pytest.mark.slow
 def test_of_laws_that_nothing_tells_apart_the_simplest_comes_first() -> None:
     """A wave of a low frequency beside it is a constant, and never worse on the rows fitted."""
     (found,) = of_a_product()

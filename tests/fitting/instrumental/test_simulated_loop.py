@@ -57,6 +57,7 @@ def _window(dataset: Dataset, model: Model) -> tuple[float, float]:
     return cut.window
 
 
+@pytest.mark.slow
 def test_two_starts_reach_the_same_fixed_point(quiet):
     model = loops.model(coulomb=True)
     found = [

@@ -36,6 +36,7 @@ def test_the_mass_is_right_though_friction_reverses_within_a_sample(monkeypatch)
     assert size() > 2.5
 
 
+@pytest.mark.slow
 def test_an_estimate_says_which_rows_it_left_out() -> None:
     found = di.fit(model(), recorded(0.5, 0.05, 0))
     (note,) = (one for one in found.notes if "reversals of slider" in one)
@@ -45,6 +46,7 @@ def test_an_estimate_says_which_rows_it_left_out() -> None:
     assert noisy.rows > found.rows
 
 
+@pytest.mark.slow
 def test_what_is_left_of_them_is_the_first_thing_said() -> None:
     """Of a motion so fast, and noise so small, that the rows that count are wrong, too."""
     assert "reverses within" not in di.fit(model(), recorded(0.5, 0.05, 0)).headline

@@ -245,6 +245,7 @@ def test_a_stop_is_one_whichever_part_of_the_recording_it_lies_in(
     np.testing.assert_allclose(parts.rms, whole.rms, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_instruments_leave_out_the_same_rows() -> None:
     settings = Filter(position_cutoff_hz=40.0, cutoff_hz=18.0, rate_hz=50.0)
     data = replace(standing(0, 1), filter=settings)
@@ -254,6 +255,7 @@ def test_instruments_leave_out_the_same_rows() -> None:
     assert found.joint_errors[ELBOW] < 0.1
 
 
+@pytest.mark.slow
 def test_a_width_beyond_what_a_joint_stands_at_is_said_with_the_line_that_mends_it() -> None:
     data = standing(0, 1, 2)
     wide, place = di.fit(given(), data), given().names.index("Fc@elbow")
@@ -266,6 +268,7 @@ def test_a_width_beyond_what_a_joint_stands_at_is_said_with_the_line_that_mends_
     assert off[1] < off[0] / 10
 
 
+@pytest.mark.slow
 def test_a_short_recording_of_a_joint_that_is_known_to_stand_loses_its_stops_too() -> None:
     """Fits and comparisons count the same rows, whatever either shows of the joint by itself."""
     train = standing(0, 1, 2)

@@ -38,6 +38,7 @@ def test_a_wrong_width_is_said_where_it_makes_friction_wrong(factor: float, side
     assert np.abs(errors).min() > 3.0
 
 
+@pytest.mark.slow
 def test_noise_that_hides_the_width_hides_what_it_does() -> None:
     for seed in range(4):
         found = di.fit(model(1.5 * WIDTH), recorded(HZ, 40.0, seed))

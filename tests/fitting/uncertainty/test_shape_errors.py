@@ -53,6 +53,7 @@ def test_a_size_is_as_uncertain_as_its_shape_makes_it() -> None:
     assert np.mean(within) >= 0.75
 
 
+@pytest.mark.slow
 def test_a_size_that_its_shape_leaves_open_is_no_number(tmp_path: Path) -> None:
     open_ = [one for one in estimates(0.012, LEVEL) if one.trading_off]
     assert open_

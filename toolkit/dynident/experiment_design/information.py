@@ -151,7 +151,7 @@ class LossAlong:
         mix = ca.sparsify(ca.DM(information.mix / information.scale)).T
         weight = ca.diag(ca.DM(np.sqrt(information.weight / instants)))
         rows = ca.densify(mix @ columns.function(x) @ weight)
-        back = ca.densify(ca.jtimes(rows, x, seed, True))
+        rows, back = ca.cse([rows, ca.densify(ca.jtimes(rows, x, seed, True))])
         self._rows = MappedFunction(ca.Function("rows", [x], [rows]), instants)
         self._back = MappedFunction(ca.Function("back", [x, seed], [back]), instants)
         self._prior = information.prior / np.outer(information.scale, information.scale)

@@ -88,12 +88,13 @@ class ColumnFunction:
         for place, effect in later:
             whole = whole + own[place] @ values[model.slices[effect.label]]
         beside = [_effect_columns(model, effect, robot, x, torque) for effect in more]
-        columns = ca.densify(ca.horzcat(rigid, *own, *beside))
+        columns = ca.densify(ca.horzcat(rigid, *own, *beside)).T
         labels = [*model.names]
         for effect in more:
             labels += [effect.parameter_name(p.name) for p in effect.parameters(model.robot)]
-        function = ca.Function("columns", [x], [columns.T])
-        return cls(function, ca.Function("torque", [x], [ca.densify(whole)]), tuple(labels), n)
+        columns, whole = ca.cse([columns, ca.densify(whole)])
+        functions = ca.Function("columns", [x], [columns]), ca.Function("torque", [x], [whole])
+        return cls(*functions, tuple(labels), n)
 
     @property
     def count(self) -> int:
