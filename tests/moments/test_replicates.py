@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dynident.criteria import DEFAULTS
+from dynident.moments.replicates import TimeVarying, time_varying_products
 from dynident.moments.solution import regress
 from row_moments import row_moments
 
@@ -85,3 +86,17 @@ def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
     solution = regress(row_moments(data, data, np.array([0, 300]), "single").pooled(), RELIABLE)
     assert solution.rank == 1
     assert np.allclose(solution.values @ [1.0, 2.0], 5.0)
+
+
+def test_products_of_each_group_are_those_of_all_that_are_its_own() -> None:
+    count, groups, width = 60, 4, 3
+    shape = (2, 3, count, groups * width)
+    both = RNG.normal(size=shape), RNG.normal(size=shape)
+    columns = TimeVarying(*both, np.zeros(groups * width, dtype=bool))
+    edges = np.array([0, 13, 30, count])
+    every = time_varying_products(columns, columns, edges)
+    found = columns.products_of_each(width, edges)
+    assert found.shape == (len(every), groups, width, width)
+    for k in range(groups):
+        own = slice(k * width, (k + 1) * width)
+        np.testing.assert_allclose(found[:, k], every[:, own, own], atol=1e-12)

@@ -123,6 +123,28 @@ class TimeVarying:
             self.is_torque,
         )
 
+    def products_of_each(self, width: int, edges: np.ndarray) -> np.ndarray:
+        """Products, free of noise, of each group of neighbouring columns, (R B, k / width, w, w).
+
+        What columns of two groups have in common is not worked out.
+
+        Parameters
+        ----------
+        width : of a group, w, alike in all.
+        edges : (B + 1,) as for `time_varying_products`.
+        """
+        recordings, *others, count = self.columns.shape
+        groups = count // width
+
+        def apart(columns: np.ndarray) -> np.ndarray:
+            each = np.moveaxis(columns.reshape(recordings, *others, groups, width), 3, 1)
+            return each.reshape(-1, *others, width)
+
+        each = TimeVarying(apart(self.columns), apart(self.instruments), self.is_torque[:width])
+        products = time_varying_products(each, each, edges)
+        by_group = products.reshape(recordings, groups, -1, width, width)
+        return np.swapaxes(by_group, 1, 2).reshape(-1, groups, width, width)
+
 
 def instrumental_values(every: Sequence[TimeVarying]) -> np.ndarray:
     """Values (p,) of columns before the torque that leave nothing of it in any instrument.

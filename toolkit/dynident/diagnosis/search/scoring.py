@@ -158,9 +158,7 @@ def candidate_moments(
                 known_values = fitted.beside(variants[0]).values
                 products = time_varying_products(old.about(known_values), new, edges)
                 one[-1] = one[-1].with_signal(with_torque_again(products, known_values))
-                products = time_varying_products(new, new, edges)
-                apart = products.reshape(-1, len(variants), width, len(variants), width)
-                two[-1] = two[-1].with_signal(np.einsum("bvivj->bvij", apart))
+                two[-1] = two[-1].with_signal(new.products_of_each(width, edges))
         with_model.append(reduce(add, one))
         with_self.append(reduce(add, two))
     return CandidateMoments(SecondMoments.stacked(with_model), SecondMoments.stacked(with_self))
