@@ -234,10 +234,10 @@ class MotionProgram:
 
     def solver(self) -> MotionSolver:
         """Return the search, to be started anywhere."""
-        each = _EACH if self.motions.n * self.motions.size > _MANY else 1
-        return self._solver(self.instants, _ITERATIONS, each)
+        return self._solver(self.instants, _ITERATIONS)
 
-    def _solver(self, evaluated: int, iterations: int, each: int) -> MotionSolver:
+    def _solver(self, evaluated: int, iterations: int) -> MotionSolver:
+        each = _EACH if self.motions.n * self.motions.size > _MANY else 1
         instants = evaluated, instants_of(self.motions), each
         shares = torque_shares(self.torque.columns.torque, self._torque_left)
         return MotionSolver.of(self.motions, self.informations, instants, iterations, shares)
@@ -280,7 +280,7 @@ class MotionProgram:
         # Fine grids and distances are costly: they are looked at from the best motion on.
         clear = (one for begin in found for one in self._within(begin))
         begins = list(islice(clear, _GLANCES * starts))
-        short = self._solver(instants_of(self.motions), _GLANCE, _EACH)
+        short = self._solver(instants_of(self.motions), _GLANCE)
         for begin in tuple(begins):
             near = self._torque_shares(begin.variables) > _NEAR
             torques = self._large_torques(begin.variables, near)
