@@ -104,7 +104,6 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         pytest.param("diagnose", REPEATED, "replicates", marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.slow
 def test_diagnosis(run, study, tmp_path, command, text, source):
     path = study(text)
     before = listing(tmp_path)

@@ -79,7 +79,6 @@ def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Dia
         in_full("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
     ],
 )
-@pytest.mark.slow
 def test_a_hidden_effect_is_found_and_the_error_falls_to_the_floor(
     model: Model, hidden: str, values: dict[str, float]
 ) -> None:

@@ -46,7 +46,6 @@ def test_joints_and_traces_are_in_amperes(found: tuple[Diagnosis, DriveGains]) -
     assert [one["torque_unit"] for one in shown.to_dict()["joints"]] == ["A", "A"]
 
 
-@pytest.mark.slow
 def test_newton_metres_stay(found: tuple[Diagnosis, DriveGains]) -> None:
     plain, drives = found
     assert in_recorded_units(plain, None) is plain

@@ -152,7 +152,6 @@ def test_test_recordings_that_do_not_repeat_are_judged_all_the_same(model: Model
     assert found.verdict == "unexplained"
 
 
-@pytest.mark.slow
 def test_test_recordings_that_repeat_give_the_floor_that_the_others_cannot(model: Model) -> None:
     runs = recordings(model)
     train = Dataset(tuple(r.replace(period=None) for r in runs[:3]))

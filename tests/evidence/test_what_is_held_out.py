@@ -25,7 +25,6 @@ def runs():
 
 
 @pytest.mark.parametrize("blocks", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.slow
 def test_held_out_are_recordings_or_blocks_of_time(runs, blocks: bool) -> None:
     train, test = Dataset(runs if blocks else runs[:1]), Dataset(() if blocks else runs[1:])
     table, *_ = compare_models({"given": MODEL}, train, test).tables()

@@ -35,7 +35,6 @@ def test_a_gain_is_found_whatever_its_size(model: Model, gain: float) -> None:
 
 
 @pytest.mark.parametrize("gain", [-0.4, pytest.param(0.8, marks=pytest.mark.slow)])
-@pytest.mark.slow
 def test_a_model_with_a_gain_leaves_nothing_but_noise(model: Model, gain: float) -> None:
     """Taken at parameters that had not converged, the gain's column left a residual behind."""
     runs = recordings(model, gain, 0.05)

@@ -33,7 +33,6 @@ def disturbed(writer: Writer) -> Written:
     return written(writer, [*map(killed_within, LINES), no_room])
 
 
-@pytest.mark.slow
 def test_a_kill_leaves_the_old_or_the_new_and_no_kill_the_new(
     writer: Writer, disturbed: Written
 ) -> None:
@@ -43,7 +42,6 @@ def test_a_kill_leaves_the_old_or_the_new_and_no_kill_the_new(
     assert killed_after(writer, 0.05).lost == []
 
 
-@pytest.mark.slow
 def test_no_room_leaves_the_old_files_and_one_line(writer: Writer, disturbed: Written) -> None:
     full = disturbed.damage[-1]
     assert full.status == 2

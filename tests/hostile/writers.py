@@ -149,7 +149,7 @@ READ = frozenset(
 """Arguments and options that name files which are read, and left as they are."""
 
 LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"})
-"""Commands that take seconds: `make test-fast` leaves them out."""
+"""Commands that take seconds, in tests of which the others are in `make test-fast`."""
 MARKED = [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS]
 each_writer = pytest.mark.parametrize("name", MARKED)
 WITH_CODE_OF_THEIR_OWN = [one for one in MARKED if one.values[0] != "demo of a design"]

@@ -150,7 +150,7 @@ def test_more_pairs_than_are_tried_are_said() -> None:
         named_by_numbers(x, arm(), None, "x")
 
 
-@pytest.mark.parametrize("beside", [16, pytest.param(26, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("beside", [16, 26])
 @pytest.mark.slow
 def test_many_motors_that_warm_up_are_no_motion(beside: int) -> None:
     """Each rises in its own time, and more than 21 columns are looked at where joints are few."""

@@ -92,7 +92,6 @@ def test_slow_noise_that_spoils_the_parameters_follows_no_motion() -> None:
 
 
 @pytest.mark.parametrize("hidden", [0.0, pytest.param(0.002, marks=pytest.mark.slow)])
-@pytest.mark.slow
 def test_noise_and_what_is_far_below_it_follow_no_motion(hidden: float) -> None:
     found = diagnosed(hidden)
     assert found.noise_source == "unknown"

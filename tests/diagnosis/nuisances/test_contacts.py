@@ -124,7 +124,7 @@ def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, heigh
     assert np.sign(pulse.amplitude) == np.sign(height)
 
 
-@pytest.mark.parametrize("kind", ["", pytest.param("slow", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["", "slow"])
 @pytest.mark.slow
 def test_a_wide_and_large_burst_does_not_hide_behind_itself(kind: str) -> None:
     """It is the most of what is seen at some speeds, and of what is far out, of two repetitions."""

@@ -44,8 +44,9 @@ wider laws leads to no better motions than as many searches from elsewhere do.""
 _MANY, _EACH = 120, 3
 """Variables over which a search begins with the limits of every third instant; between these a
 motion may use a fifth more, at most 1 / cos(3 pi / 14) of a limit. With seven joints of 14
-harmonics (189 variables) all parameters take 50 s in place of 86, of 20 harmonics 131 s in place of
-more than 280, and sigma is the same to 2 %; with 8 (105 variables) and fewer nothing is gained."""
+harmonics (189 variables) all parameters took 50 s in place of 86, of 20 harmonics 131 s in place of
+more than 280, and sigma was the same to 2 %; with 8 (105 variables) and fewer nothing was gained,
+and the first glances, if they have fewer limits, are at worse motions."""
 _ITERATIONS, _ITERATIONS_ALL = 150, 300  # of a search, and of all that go on from where one ended
 _ROUNDS = 12  # of these
 _SHRINKS, _LEAST_SHRINK = 100, 1.0 - 1e-3  # the latter of a motion that is just beyond

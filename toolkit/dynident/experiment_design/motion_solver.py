@@ -2,7 +2,7 @@
 
 There are few variables (nine or so a joint) and thousands of limits, nearly all of them linear, of
 which few are used at the end. That is what a method of active sets is for: on the arm of
-`problems/seven_joint_arm` SLSQP tells joint zero from spring better after 48 iterations in 1.2 s
+`problems/seven_joint_arm` SLSQP told joint zero from spring better after 48 iterations in 1.2 s
 than Ipopt after 150 in 14 s. Its time grows with the rows: it may begin with the limits of some
 instants, and others come in where a motion turns out too large. Torques are not linear, and rows of
 them at all instants, which are nearly the same from one to the next, made SLSQP fail in one of four
@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from dynident.experiment_design.columns.mapped_function import MappedFunction
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information, LossAlong
 from dynident.experiment_design.motions.limited_motions import (
@@ -150,7 +149,7 @@ class MotionSolver:
         return cls(
             motions=motions,
             grid=grid,
-            losses=tuple(one.loss_along(evaluated) for one in informations),
+            losses=tuple(LossAlong(one, evaluated) for one in informations),
             terms=terms_of(informations),
             limits=rows,
             imposed=imposed,
@@ -191,8 +190,7 @@ class MotionSolver:
         times, joints = (np.array(one) for one in zip(*sorted(torques), strict=True))
         grid = MotionGrid.of(self.motions, times)
         left = np.ones(len(joints)) if room is None else room[joints]
-        shares = MappedFunction(self.shares, len(times))
-        return replace(self, torque=LimitedTorque(shares, grid, joints, left))
+        return replace(self, torque=LimitedTorque(self.shares, grid, joints, left))
 
     def cut(self, cuts: Sequence[RoomCut], inside: np.ndarray | None = None) -> MotionSolver:
         """Return the search with bounds on the position at single instants, and no others.

@@ -126,24 +126,23 @@ class TimeVarying:
     def products_of_each(self, width: int, edges: np.ndarray) -> np.ndarray:
         """Products, free of noise, of each group of neighbouring columns, (R B, k / width, w, w).
 
-        What columns of two groups have in common is not worked out.
+        As `time_varying_products`; what columns of two groups have in common is not worked out.
 
         Parameters
         ----------
-        width : of a group, w, alike in all.
-        edges : (B + 1,) as for `time_varying_products`.
+        width : of a group, w, alike in all; no column is the torque.
+        edges : (B + 1,) first instant of each block, and S.
         """
-        recordings, *others, count = self.columns.shape
-        groups = count // width
-
-        def apart(columns: np.ndarray) -> np.ndarray:
-            each = np.moveaxis(columns.reshape(recordings, *others, groups, width), 3, 1)
-            return each.reshape(-1, *others, width)
-
-        each = TimeVarying(apart(self.columns), apart(self.instruments), self.is_torque[:width])
-        products = time_varying_products(each, each, edges)
-        by_group = products.reshape(recordings, groups, -1, width, width)
-        return np.swapaxes(by_group, 1, 2).reshape(-1, groups, width, width)
+        recordings, _, _, count = self.columns.shape
+        shape, found = (recordings, count // width, width, -1), []
+        for start, stop in pairwise(edges.tolist()):
+            one, two = (
+                np.moveaxis(each[:, :, start:stop], 3, 1).reshape(shape)
+                for each in (self.columns, self.instruments)
+            )
+            there = one @ np.swapaxes(two, -1, -2)
+            found.append((there + np.swapaxes(there, -1, -2)) / 2.0)
+        return np.stack(found, axis=1).reshape(-1, *shape[1:3], width)
 
 
 def instrumental_values(every: Sequence[TimeVarying]) -> np.ndarray:

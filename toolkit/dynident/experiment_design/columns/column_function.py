@@ -11,7 +11,7 @@ import numpy as np
 from dynident.batch.newton_euler import regressor_equations, torque_equations
 from dynident.effects import Effect
 from dynident.errors import DesignError, DynidentError
-from dynident.experiment_design.columns.mapped_function import MappedFunction
+from dynident.experiment_design.columns.mapped import mapped
 from dynident.late_modules import LateModule
 from dynident.model import Model
 from dynident.robot import Robot
@@ -92,6 +92,7 @@ class ColumnFunction:
         labels = [*model.names]
         for effect in more:
             labels += [effect.parameter_name(p.name) for p in effect.parameters(model.robot)]
+        # Slopes by what changes the bodies hold the rigid torque several times.
         columns, whole = ca.cse([columns, ca.densify(whole)])
         functions = ca.Function("columns", [x], [columns]), ca.Function("torque", [x], [whole])
         return cls(*functions, tuple(labels), n)
@@ -127,7 +128,7 @@ class ColumnFunction:
 def _along(function: Any, t: np.ndarray, *motion: np.ndarray) -> np.ndarray:
     """A function of an instant along a motion, (T, columns, rows)."""
     inputs = np.hstack([*motion, t[:, None]])
-    (found,) = MappedFunction(function, len(t))(inputs[:, None])
+    (found,) = mapped(function, inputs[:, None])
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.experiment_design.columns.mapped_function import MappedFunction
+from dynident.experiment_design.columns.mapped import mapped
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.late_modules import LateModule
 
@@ -98,13 +98,13 @@ class LimitedTorque:
 
     Attributes
     ----------
-    shares : see `torque_shares`, at these instants.
+    function : see `torque_shares`.
     grid : instants, each as often as torques are limited there.
     joints : (k,) whose torque is limited at each of them.
     room : (k,) shares of the limits that are left there.
     """
 
-    shares: MappedFunction
+    function: Any
     grid: MotionGrid
     joints: np.ndarray
     room: np.ndarray
@@ -117,7 +117,7 @@ class LimitedTorque:
         variables : (n, k).
         """
         signals, n, count, _ = self.grid.slopes.shape
-        share, slope = self.shares(self.grid.inputs(variables)[:, None])
+        share, slope = mapped(self.function, self.grid.inputs(variables)[:, None])
         each = np.arange(count)
         by_signals = slope[each, :, self.joints].reshape(count, signals, n)
         found = np.einsum("tsj,sjtk->tjk", by_signals, self.grid.slopes)
@@ -126,7 +126,7 @@ class LimitedTorque:
 
 
 def torque_shares(torque: Any, most: np.ndarray) -> Any:
-    """Return shares of the limits of torque (n,) and their slopes by q, v and a, (n, 3 n).
+    """Return the function of an instant that gives shares of limits of torque, and their slopes.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def torque_shares(torque: Any, most: np.ndarray) -> Any:
 
     Returns
     -------
-    casadi.Function of the same.
+    casadi.Function of q, v, a and the time: shares (n,), and their slopes by q, v and a, (n, 3 n).
     """
     x = ca.SX.sym("x", 3 * len(most) + 1)
     share = ca.densify(torque(x) / ca.DM(most))
