@@ -184,7 +184,7 @@ class LossAlong:
         asked = self._asked
         own = slice(len(factor) - asked.last, None)
         last = np.eye(len(factor))[:, own]
-        turned = solve_triangular(factor, last, lower=True, trans="T")
+        turned = solve_triangular(factor, last, lower=True, trans=1)
         if asked.objective == "A":
             variances = float(np.sum(turned[own] ** 2))
             by_variance = turned @ turned[own].T
