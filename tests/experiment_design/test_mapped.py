@@ -43,3 +43,6 @@ def test_other_sizes_and_sparse_results_are_refused() -> None:
         mapped(FUNCTION, x)
     with pytest.raises(ValueError, match="sparse"):
         mapped(ca.Function("diagonal", [X], [ca.diag(X)]), x)
+    diagonal = ca.SX.sym("d", ca.Sparsity.diag(3))
+    with pytest.raises(ValueError, match="sparse"):
+        mapped(ca.Function("trace", [diagonal], [ca.trace(diagonal)]), np.ones((2, 3, 3)))

@@ -25,7 +25,7 @@ def mapped(function: Any, *arguments: np.ndarray) -> list[np.ndarray]:
     Raises
     ------
     ValueError
-        If the function has another number of arguments, or of another size, or a sparse one.
+        If the function takes another number of arguments, or of another size, or is sparse.
     """
     instants = len(arguments[0])
     inside = [np.ascontiguousarray(one, dtype=float) for one in arguments]
@@ -34,8 +34,10 @@ def mapped(function: Any, *arguments: np.ndarray) -> list[np.ndarray]:
     if [one.shape for one in inside] != taken:
         raise ValueError(f"{function.name()} takes {taken}, not {[one.shape for one in inside]}")
     results = range(function.n_out())
-    if not all(function.sparsity_out(k).is_dense() for k in results):
-        raise ValueError(f"{function.name()} has a sparse result")
+    sparsities = [function.sparsity_in(k) for k in range(function.n_in())]
+    sparsities += [function.sparsity_out(k) for k in results]
+    if not all(one.is_dense() for one in sparsities):
+        raise ValueError(f"{function.name()} has a sparse argument or result")
     outside = [np.empty((instants, *reversed(function.size_out(k)))) for k in results]
     buffer, call = function.map(instants).buffer()
     for k, one in enumerate(inside):
