@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from dynident import files
 from dynident.errors import StudyError
-from dynident.words import did_you_mean
+from dynident.words import nearest
 
 
 class SettingsTable(BaseModel):
@@ -113,18 +113,6 @@ def _unquoted(text: str, complaint: str) -> str:
     if rest.startswith(("True", "False")):
         return "write true or false, in small letters"
     return "texts stand between quotes" if rest[:1].isalpha() else ""
-
-
-def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
-    """Return a remedy for a misspelt word: the valid word that it resembles, else all of them.
-
-    Parameters
-    ----------
-    word : as it was written.
-    valid : words in its place.
-    kind : what they are, in the plural.
-    """
-    return did_you_mean(word, valid, f"{kind}: {', '.join(valid)}")
 
 
 def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 LONGEST_WORD = 200
 """Letters of a name that somebody may have meant; what is longer is not compared, which would take
@@ -29,6 +29,32 @@ def did_you_mean(
     written = {one.lower(): one for one in reversed(list(valid))}
     close = difflib.get_close_matches(word.lower(), list(written), 1, cutoff)
     return f"did you mean '{written[close[0]]}'?" if close else otherwise
+
+
+def nearest(word: str, valid: Sequence[str], kind: str) -> str:
+    """Return a remedy for a misspelt word: the valid word that it resembles, else all of them.
+
+    Parameters
+    ----------
+    word : as it was written.
+    valid : words in its place.
+    kind : what they are, in the plural.
+    """
+    return did_you_mean(word, valid, _all(valid, kind))
+
+
+def nearest_and_all(word: str, valid: Sequence[str], kind: str) -> str:
+    """Return a remedy for a misspelt word: the valid word that it resembles, and all of them.
+
+    Parameters
+    ----------
+    word, valid, kind : as for `nearest`.
+    """
+    return f"{did_you_mean(word, valid)} {_all(valid, kind)}".lstrip()
+
+
+def _all(valid: Sequence[str], kind: str) -> str:
+    return f"{kind}: {', '.join(valid) or 'none'}"
 
 
 def shortened(text: str) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from dynident.effects import FRICTION_WIDTH, Block, Effect, Law, Term, Transmission, effects_of
 from dynident.errors import EffectError, SimulationError
 from dynident.robot import Robot
-from dynident.settings import nearest
+from dynident.words import nearest
 
 
 @dataclass(frozen=True)

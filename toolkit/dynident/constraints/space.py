@@ -12,8 +12,7 @@ from dynident.errors import FitError
 from dynident.inertia import PARAMETERS, UNITS, frame_change, reference_body
 from dynident.model import Model
 from dynident.robot import Link, Robot
-from dynident.settings import nearest
-from dynident.words import did_you_mean
+from dynident.words import did_you_mean, nearest
 
 _FALLBACK_LENGTH = 0.1  # m, where a robot gives no length at all
 

@@ -25,8 +25,8 @@ from dynident.criteria.search_criteria import (
 )
 from dynident.criteria.wiring_criteria import WiringCriteria
 from dynident.errors import CriteriaError
-from dynident.settings import nearest
 from dynident.tables import Table
+from dynident.words import nearest
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

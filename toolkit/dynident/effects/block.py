@@ -10,7 +10,7 @@ import numpy as np
 from dynident.errors import EffectError
 from dynident.robot import Robot
 from dynident.robot.joint_derivatives import JointDerivatives
-from dynident.words import did_you_mean
+from dynident.words import nearest
 
 FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
@@ -68,8 +68,7 @@ class Block:
     def index(self, joint: str | None) -> int:
         """Column of a joint."""
         if joint not in self.names:
-            valid = f"joints: {', '.join(self.names)}"
-            remedy = did_you_mean(str(joint), self.names, valid)
+            remedy = nearest(str(joint), self.names, "joints")
             raise EffectError(f"no joint '{joint}'", remedy=remedy)
         return self.names.index(joint)
 

@@ -30,7 +30,7 @@ from dynident.effects.terms import Term
 from dynident.effects.traits import EffectTraits
 from dynident.errors import EffectError
 from dynident.robot import Robot
-from dynident.words import did_you_mean
+from dynident.words import nearest_and_all
 
 _OWN = f"{__name__.partition('.')[0]}."
 Motion = Literal[
@@ -157,8 +157,7 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
                 verb = "needs" if expected else "takes no"
                 raise EffectError(f"{self.name} {verb} {role}", self.label, _form(type(self)))
             if value is not None and value not in robot.names:
-                meant = did_you_mean(str(value), robot.names)
-                valid = f"{meant} joints: {', '.join(robot.names)}".lstrip()
+                valid = nearest_and_all(str(value), robot.names, "joints")
                 raise EffectError(f"the robot has no joint '{value}'", self.label, valid)
         if self.source is not None and self.source == self.joint:
             raise EffectError("a joint is not coupled to itself", self.label, _form(type(self)))

@@ -15,7 +15,7 @@ from dynident.effects.effect import Effect
 from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
 from dynident.effects.laws import PREFIX, Law, LawEffect, law_effect
 from dynident.errors import EffectError, warn
-from dynident.settings import nearest
+from dynident.words import nearest
 
 ENTRY_POINTS = "dynident.effects"
 """Group of entry points by which packages bring effects: each names a module, or a class in one."""

@@ -24,7 +24,7 @@ from dynident.fitting.sampling import sample
 from dynident.inertia import PARAMETERS
 from dynident.model import Model
 from dynident.recording import Dataset
-from dynident.settings import nearest
+from dynident.words import nearest
 
 _SIZES = 5  # random motions by which columns are scaled
 _UNSEEN = 1e-9  # of the size of the others: it makes no torque

@@ -17,7 +17,8 @@ from dynident.experiment_design.geometry.surroundings import (
     StayBox,
 )
 from dynident.robot import Robot
-from dynident.settings import SettingsTable, nearest, read_toml
+from dynident.settings import SettingsTable, read_toml
+from dynident.words import nearest
 
 MARGIN = 0.9
 """Share of the description's limits that a motion uses."""

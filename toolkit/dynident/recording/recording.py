@@ -15,7 +15,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording.masks import within
 from dynident.settings import LONGEST_TIME
-from dynident.words import did_you_mean
+from dynident.words import nearest
 
 USES = ("train", "test")
 TORQUES = ("measured", "held_command")
@@ -237,8 +237,7 @@ class Recording:
         """
         missing = [joint for joint in joints if joint not in self.joints]
         if missing:
-            valid = f"joints: {', '.join(self.joints)}"
-            remedy = did_you_mean(missing[0], self.joints, valid)
+            remedy = nearest(missing[0], self.joints, "joints")
             raise RecordingError(f"no joint '{missing[0]}'", self.where, remedy)
         picked = [self.joints.index(joint) for joint in joints]
         stops = tuple(self.stops[j] for j in picked) if self.stops else ()

@@ -16,7 +16,7 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.maps import SPECTRA, ResidualMap
-from dynident.words import did_you_mean
+from dynident.words import nearest
 
 GIVEN = "model as given"
 BAND = "noise band"
@@ -184,8 +184,7 @@ def maps_of(diagnosis: Diagnosis, joint: str) -> tuple[ResidualMap, ...]:
     """
     known = [one.name for one in diagnosis.joints]
     if joint not in known:
-        remedy = did_you_mean(joint, known, f"joints: {', '.join(known)}")
-        raise DynidentError(f"no joint '{joint}'", remedy=remedy)
+        raise DynidentError(f"no joint '{joint}'", remedy=nearest(joint, known, "joints"))
     found = tuple(one for one in diagnosis.maps if one.joint == joint)
     if not found:
         raise DynidentError("the diagnosis has no residual map of it", f"joint '{joint}'")

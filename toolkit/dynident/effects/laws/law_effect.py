@@ -26,7 +26,7 @@ from dynident.formulas import (
     units_of,
 )
 from dynident.robot import Robot
-from dynident.words import did_you_mean
+from dynident.words import nearest_and_all
 
 _UNITS = {
     "rad": {
@@ -112,8 +112,7 @@ class LawEffect(JointEffect):
         joints = dict.fromkeys([self.joint, *(s.joint for s in law.signals if s.joint)])
         for joint in joints:
             if joint not in robot.names:
-                meant = did_you_mean(str(joint), robot.names)
-                valid = f"{meant} joints: {', '.join(robot.names)}".lstrip()
+                valid = nearest_and_all(str(joint), robot.names, "joints")
                 raise EffectError(f"the robot has no joint '{joint}'", self.label, valid)
         own = motion_unit(robot, self.joint)
         others = tuple((str(j), motion_unit(robot, j)) for j in joints if j != self.joint)

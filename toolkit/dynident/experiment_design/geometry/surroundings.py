@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from dynident.errors import DesignError
 from dynident.robot import Robot
-from dynident.settings import SettingsTable, nearest
+from dynident.settings import SettingsTable
+from dynident.words import nearest
 
 _Position = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Size = Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)]

@@ -22,7 +22,7 @@ from dynident.inertia import frame_change
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
 from dynident.recording import Dataset
-from dynident.settings import nearest
+from dynident.words import nearest
 
 _ROUNDING = 1e-9  # of the largest entry of a combination of parameters
 

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from dynident.errors import StudyError
 from dynident.fitting.loads.load import Load
-from dynident.settings import SettingsTable, in_unit, nearest
+from dynident.settings import SettingsTable, in_unit
+from dynident.words import nearest
 
 _LARGEST = 1e6
 _Place = Annotated[float, Field(ge=-1e3, le=1e3, json_schema_extra=in_unit("m"))]

@@ -18,7 +18,7 @@ from dynident.reporting.pictures.plots import Picture, plain
 from dynident.tables import percent
 from dynident.validation.loop_errors import QUANTITIES, LoopRun
 from dynident.validation.validation_result import Validation
-from dynident.words import did_you_mean
+from dynident.words import nearest
 
 
 def simulated_loop(
@@ -116,7 +116,6 @@ def _run_of(validation: Validation, recording: str | None = None) -> LoopRun:
 def _joint_of(validation: Validation, joint: str) -> int:
     """Return the place of a joint."""
     if joint not in validation.joints:
-        valid = f"joints: {', '.join(validation.joints)}"
-        remedy = did_you_mean(joint, validation.joints, valid)
+        remedy = nearest(joint, validation.joints, "joints")
         raise DynidentError(f"no joint '{joint}'", remedy=remedy)
     return validation.joints.index(joint)

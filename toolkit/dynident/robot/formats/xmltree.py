@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynident.errors import RobotError
-from dynident.words import did_you_mean
+from dynident.words import nearest_and_all
 
 Element = ElementTree.Element
 
@@ -201,6 +201,4 @@ def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.fl
 
 def closest(name: str, valid: Iterable[str]) -> str:
     """Return a remedy for a misspelt name: the nearest valid one, and the list."""
-    valid = list(valid)
-    listed = ", ".join(valid) if valid else "none"
-    return f"{did_you_mean(name, valid)} Valid names: {listed}".lstrip()
+    return nearest_and_all(name, list(valid), "Valid names")
