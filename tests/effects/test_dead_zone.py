@@ -24,7 +24,9 @@ def links_of_several_lengths() -> list[DeadZoneLink]:
             m = 0.07 * (1.0 + 0.2 * np.sin(t)) * rng.uniform(0.8, 1.2)
             load = np.sin(7.0 * t) + 0.1 * rng.standard_normal(len(t))
             c, g = 0.01 * np.cos(t), 0.1 * np.sin(2.0 * t)
-            links.append(DeadZoneLink(m=m, load=load, c=c, g=g, gear=gear, step=t[1]))
+            a = rng.standard_normal(len(t))
+            motion = {"whole": m, "needed": load, "a": a, "c": c, "g": g, "step": t[1]}
+            links.append(DeadZoneLink(gear=gear, least=0.035, **motion))
     return links
 
 
@@ -44,9 +46,11 @@ def test_several_gaps_at_once_are_each_gap_alone(wish, monkeypatch) -> None:
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_compiled_is_the_replay_to_the_bit(monkeypatch) -> None:
-    """For more links of one length than walk together, and for fewer."""
+    """For more links of one length than walk together, and for some of other lengths."""
     links = links_of_several_lengths()
-    links += [replace(links[0], load=scale * links[0].load) for scale in np.linspace(0.5, 2.0, 9)]
+    links += [
+        replace(links[0], needed=scale * links[0].needed) for scale in np.linspace(0.5, 2.0, 9)
+    ]
     compiled = through_dead_zones(links)
     monkeypatch.setenv("DYNIDENT_COMPILE", "never")
     for one, replayed in zip(compiled, through_dead_zones(links), strict=True):
@@ -60,8 +64,8 @@ def test_a_link_that_runs_away_does_so_quietly(wish, monkeypatch) -> None:
     monkeypatch.setenv("DYNIDENT_COMPILE", wish)
     m, load, still = np.full(STEPS, 1e-6), np.ones(STEPS), np.zeros(STEPS)
     gears = [Transmitting.of(1e-6, (15.0, 0.1, 0.3), gap) for gap in (1e-3, 1e-2)]
-    motion = {"m": m, "load": load, "c": still, "g": still - 5.0, "step": STEP}
-    links = [DeadZoneLink(gear=one, **motion) for one in gears]
+    motion = {"whole": m, "needed": load, "a": still, "c": still, "g": still - 5.0, "step": STEP}
+    links = [DeadZoneLink(gear=one, least=1e-9, **motion) for one in gears]
     for walked in through_dead_zones(links):
         assert not np.isfinite(walked.d).all()
         assert np.isin(walked.side, (-1.0, 0.0, 1.0)).all()

@@ -5,13 +5,13 @@ Until none passes every gate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from dynident.diagnosis.extension.reversals import as_much, without_their_reversals
-from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
+from dynident.diagnosis.extension.stage import DiagnosisTask, Stage, Waypoint
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
@@ -51,24 +51,31 @@ def rank_stage(stage: Stage, task: DiagnosisTask, worth: float = 0.0) -> Stage:
     found = tuple(
         alternatives_only(one, ranking) if one in stage.latest else one for one in stage.found
     )
-    return replace(stage, found=found, rounds=(*stage.rounds, ranking))
+    passed = (*stage.passed, stage.waypoint)
+    return replace(stage, found=found, rounds=(*stage.rounds, ranking), passed=passed)
 
 
-def extend(stage: Stage, task: DiagnosisTask) -> Stage:
+def extend(stage: Stage, task: DiagnosisTask, elsewhere: Collection[Waypoint] = ()) -> Stage:
     """Add the best effect, refit, and rank again, until none passes every gate.
 
     Parameters
     ----------
     stage : the model with its latest ranking.
     task : what is asked; how many effects may be added, among others.
+    elsewhere : models from which other ways went on: it ends at one of them, not ranked again.
     """
     while stage.proposals < task.most:
         many = len(stage.found)
         stage = with_one_more(stage, task)
-        if len(stage.found) == many:
+        if len(stage.found) == many or joins(stage, elsewhere):
             break
         stage = rank_stage(stage, task)
     return stage
+
+
+def joins(stage: Stage, elsewhere: Collection[Waypoint]) -> bool:
+    """Whether a model is one by which another way has come."""
+    return bool(elsewhere) and any(map(stage.waypoint.is_same, elsewhere))
 
 
 def with_one_more(stage: Stage, task: DiagnosisTask) -> Stage:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import replace
 
-from dynident.diagnosis.extension.extending import extend, rank_stage, tried, with_one_more
+from dynident.diagnosis.extension.extending import (
+    extend,
+    joins,
+    rank_stage,
+    tried,
+    with_one_more,
+)
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
 from dynident.diagnosis.search.global_search import global_search
@@ -54,7 +60,8 @@ def _searched_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> St
     if missed is None:
         return extended
     base = extended if missed.fitted is extended.fitted else first
-    other = extend(replace(base, rounds=(*base.rounds[:-1], missed.ranking)), task)
+    headed = replace(base, rounds=(*base.rounds[:-1], missed.ranking))
+    other = extend(headed, task, extended.passed)
     better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
     return other if better and set(other.doubtful) == set(extended.doubtful) else extended
 
@@ -68,7 +75,7 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
     """
     if not _leaves_a_residual(start, extended):
         return extended
-    best, latest, refused = extended, extended, {}
+    best, latest, refused, passed = extended, extended, {}, extended.passed
     most = _MUCH_LESS * extended.fitted.misfit(start.start)
     for _ in range(_WAYS):
         if not latest.found:
@@ -79,7 +86,10 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
         if not ranking.passing:
             break
         task.progress(f"going another way than by {begun}")
-        latest = extend(_from(start, ranking), task)
+        latest = extend(_from(start, ranking), task, passed)
+        if joins(latest, passed):  # from there it ends where the other way has ended
+            continue
+        passed = (*passed, *latest.passed)
         left = latest.fitted.misfit(start.start)
         if left < most and set(latest.doubtful) == set(extended.doubtful):
             best, most = latest, left

@@ -37,6 +37,31 @@ class DiagnosisTask:
     switches: AskedSwitches = "none"
 
 
+_SAME_MISFIT = 1e-3
+"""By which misfits of the same effects on the same rows may differ: shapes are sought to less."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waypoint:
+    """A model by which a search has come.
+
+    Attributes
+    ----------
+    effects : labels of what was added.
+    doubtful : joints of which rows were left out.
+    misfit : share of what the model as given leaves.
+    """
+
+    effects: frozenset[str]
+    doubtful: frozenset[str]
+    misfit: float
+
+    def is_same(self, other: Waypoint) -> bool:
+        """Whether it is the same model, whatever was added first: the same follows from it."""
+        alike = self.effects == other.effects and self.doubtful == other.doubtful
+        return alike and abs(self.misfit - other.misfit) <= _SAME_MISFIT * abs(other.misfit)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Stage:
     """The model as far as it is extended, and the evidence that it is fitted to.
@@ -51,6 +76,7 @@ class Stage:
     start, fitted : fits of the model as given, and of the one with all effects added.
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
+    passed : the models that were ranked.
     refused : labels of effects that were withdrawn, with the reason: they are not tried again.
     doubtful : joints whose dry friction may follow another law at their reversals, with the speed
         (rad/s or m/s) within which rows were left out for that.
@@ -66,6 +92,7 @@ class Stage:
     fitted: EvidenceFit
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
+    passed: tuple[Waypoint, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
     doubtful: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -81,6 +108,15 @@ class Stage:
         groups = [one.with_it or one.score.effect.label for one in self.found]
         return tuple(
             one for one, group in zip(self.found, groups, strict=True) if group == groups[-1]
+        )
+
+    @property
+    def waypoint(self) -> Waypoint:
+        """The model as a place that other ways may come by, too."""
+        return Waypoint(
+            effects=frozenset(one.score.effect.label for one in self.found),
+            doubtful=frozenset(self.doubtful),
+            misfit=self.fitted.misfit(self.start),
         )
 
     @property

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from dynident.effects.effect import Block, Parameter, motion_unit
+from dynident.effects.effect import Parameter, motion_unit
 from dynident.effects.transmissions.along import mean_inertia
-from dynident.effects.transmissions.dead_zone import Transmitting
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
-from dynident.effects.transmissions.link_response import responses
 
 _GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025, 0.05)
 """rad (a tenth of it in m): gaps that are screened."""
@@ -72,22 +70,6 @@ class Backlash(FlexibleJoint):
         """The gap at which the column is taken."""
         given = self.point[0] if self.point else 0.0
         return max(given, _LEAST) if given > 0 else _USUAL
-
-    def family(
-        self, variants: Sequence[Backlash], blocks: Sequence[Block]
-    ) -> list[list[np.ndarray]]:
-        links = [self._link(block) for block in blocks]
-        gears = [
-            [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
-            for link in links
-        ]
-        return [
-            [
-                (one.per_unit(0.0) * response.torque)[:, :, None]
-                for one, response in zip(variants, each, strict=True)
-            ]
-            for each in responses(links, gears)
-        ]
 
     def point_slope(self, block):
         _, response = self._response(self._link(block))

@@ -9,13 +9,15 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
-from typing import Any
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 
 from dynident.batch import c_function
 from dynident.effects.transmissions.dead_zone_source import ENTRY, LANES, SOURCE
+
+T = TypeVar("T")
 
 _TOGETHER = 20_000_000
 """Steps, over all links, that are walked through at once: a dozen numbers each are in memory."""
@@ -56,28 +58,56 @@ class DeadZoneLink:
 
     Attributes
     ----------
-    m, load : (S,) inertia behind the transmission, and the torque that it needs.
+    whole, needed : (S,) inertia of all that moves with the joint, and the torque that it needs.
+    a : (S,) acceleration of the motor.
     c, g : (S,) damping and stiffness without a transmission.
-    gear, step : the transmission, and the time step, s.
+    gear, least : the transmission, and the least inertia behind it, kg m^2 or kg.
+    step : of time, s.
     """
 
-    m: np.ndarray
-    load: np.ndarray
+    whole: np.ndarray
+    needed: np.ndarray
+    a: np.ndarray
     c: np.ndarray
     g: np.ndarray
     gear: Transmitting
+    least: float
     step: float
+
+    @cached_property
+    def m(self) -> np.ndarray:
+        """Inertia behind the transmission, (S,)."""
+        # In place, here and below: a search asks thousands, and memory that is new costs most.
+        left = self.whole - self.gear.rotor
+        return np.maximum(left, self.least, out=left)
+
+    @cached_property
+    def load(self) -> np.ndarray:
+        """Torque that the link needs where nothing gives way, (S,)."""
+        lost = self.gear.rotor * self.a
+        return np.subtract(self.needed, lost, out=lost)
+
+    @property
+    def resting(self) -> np.ndarray:
+        """The load of the first two steps, at rest, (2,)."""
+        return self.needed[:2] - self.gear.rotor * self.a[:2]
 
 
 @dataclass(frozen=True, eq=False)
 class DeadZoneMotion:
-    """Deflection of a link in a dead zone (S,), and the side that it touches: -1, 0 or 1.
-
-    The deflection is not finite where the link ran away.
-    """
+    """Deflection d of a link in a dead zone, (S,): not finite where the link ran away."""
 
     d: np.ndarray
-    side: np.ndarray
+    half_gap: float
+
+    @cached_property
+    def side(self) -> np.ndarray:
+        """The side that it touches, (S,): -1, 0 or 1; 0 in the first and the last step."""
+        found = np.zeros_like(self.d)
+        inner = self.d[1:-1]
+        found[1:-1][inner > self.half_gap] = 1.0
+        found[1:-1][inner < -self.half_gap] = -1.0
+        return found
 
 
 def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
@@ -85,48 +115,47 @@ def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     walk = c_function(SOURCE, ENTRY)
     if walk is None:
         return _replayed(links)
-    return [
-        one
-        for _, same in groupby(links, key=lambda link: len(link.m))
-        for some in _parts(list(same), LANES)
-        for one in _compiled(walk, some)
-    ]
+    found: dict[int, DeadZoneMotion] = {}
+    # Links of about as many steps walk together: none waits for others.
+    order = sorted(range(len(links)), key=lambda v: len(links[v].a))
+    for some in _parts(order, LANES):
+        found |= zip(some, _compiled(walk, [links[v] for v in some]), strict=True)
+    return [found[v] for v in range(len(links))]
 
 
-def _parts(links: Sequence[DeadZoneLink], most: int) -> list[Sequence[DeadZoneLink]]:
-    return [links[k : k + most] for k in range(0, len(links), most)]
+def _parts(every: Sequence[T], most: int) -> list[Sequence[T]]:
+    return [every[k : k + most] for k in range(0, len(every), most)]
 
 
 def _compiled(walk: Any, links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
-    """Return how up to `LANES` links of as many steps move, by the compiled function."""
-    steps, lanes = len(links[0].m), [*links, *[links[-1]] * (LANES - len(links))]
+    """Return how up to `LANES` links move, by the compiled function."""
+    lanes = [*links, *[links[-1]] * (LANES - len(links))]
     read = [
         np.ascontiguousarray(x, dtype=float)
         for link in lanes
-        for x in (link.m, link.load, link.c, link.g)
+        for x in (link.whole, link.needed, link.a, link.c, link.g)
     ]
-    gears = [link.gear for link in lanes]
     values = np.array(
         [
-            (one.stiffness, one.damping, one.half_gap, link.step)
-            for one, link in zip(gears, lanes, strict=True)
+            (one.stiffness, one.damping, one.half_gap, one.rotor, link.least, link.step)
+            for link in lanes
+            for one in (link.gear,)
         ]
     ).T.copy()
-    moved = [DeadZoneMotion(np.zeros(steps), np.zeros(steps)) for _ in links]
-    moved += [moved[-1]] * (LANES - len(links))
-    written = [x for one in moved for x in (one.d, one.side)]
+    moved = [DeadZoneMotion(np.empty(len(link.a)), link.gear.half_gap) for link in links]
+    written = [one.d for one in (*moved, *[moved[-1]] * (LANES - len(links)))]
     walk(
-        ctypes.c_long(steps),
+        (ctypes.c_long * LANES)(*(len(link.a) for link in lanes)),
         (ctypes.c_void_p * len(read))(*(x.ctypes.data for x in read)),
         ctypes.c_void_p(values.ctypes.data),
         (ctypes.c_void_p * len(written))(*(x.ctypes.data for x in written)),
     )
-    return moved[: len(links)]
+    return moved
 
 
 def _replayed(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     """Return how links move, by NumPy: a step costs the same for one and for dozens."""
-    longest = max(len(link.m) for link in links)
+    longest = max(len(link.a) for link in links)
     most = max(1, _TOGETHER // longest)
     if len(links) > most:
         return [one for part in _parts(links, most) for one in _replayed(part)]
@@ -135,10 +164,9 @@ def _replayed(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
         return [_walk(recursion)]
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
-        d, beyond = _walk_together(recursion)
-        side = np.nan_to_num(np.sign(beyond))
-    lengths = [len(link.m) for link in links]
-    return [DeadZoneMotion(d[:s, v], side[:s, v]) for v, s in enumerate(lengths)]
+        d = _walk_together(recursion)
+    own = enumerate(links)
+    return [DeadZoneMotion(d[: len(one.a), v], one.gear.half_gap) for v, one in own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +191,7 @@ class _Recursion:
     @classmethod
     def of(cls, links: Sequence[DeadZoneLink]) -> _Recursion:
         """Return it of all links; shorter ones repeat their last step."""
-        steps = max(len(link.m) for link in links)
+        steps = max(len(link.a) for link in links)
         m, load, c, g = np.empty((4, steps, len(links)))
         for v, link in enumerate(links):
             for whole, own in ((m, link.m), (load, link.load), (c, link.c), (g, link.g)):
@@ -182,8 +210,8 @@ class _Recursion:
         return cls(start, load, drive, free, touching, half)
 
 
-def _walk_together(r: _Recursion) -> tuple[np.ndarray, np.ndarray]:
-    """Return deflections (S, V) of V links, and what of them is beyond the gap.
+def _walk_together(r: _Recursion) -> np.ndarray:
+    """Return deflections (S, V) of V links.
 
     The call is what costs in a step, not its dozens of numbers: as few as can be.
     """
@@ -208,7 +236,7 @@ def _walk_together(r: _Recursion) -> tuple[np.ndarray, np.ndarray]:
         np.multiply(pushed, ahead, out=pushed)
         np.multiply(back, before, out=held)
         np.subtract(pushed, held, out=after)
-    return d, both[:, 1]
+    return d
 
 
 def _walk(r: _Recursion) -> DeadZoneMotion:
@@ -218,17 +246,15 @@ def _walk(r: _Recursion) -> DeadZoneMotion:
     touching, touching_back = r.touching[:, :, 0].T.tolist()
     half = float(r.half[0])
     before, now = r.start[:, 0].tolist()
-    d, side = [before, now, *[0.0] * (len(load) - 2)], [0.0] * len(load)
+    d = [before, now, *[0.0] * (len(load) - 2)]
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
         if now >= half:
             after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
-            side[k] = 1.0
         elif now <= -half:
             after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
-            side[k] = -1.0
         else:
             after = pushed * free[k] - free_back[k] * before
         before, now = now, after
         d[k + 1] = after
-    return DeadZoneMotion(np.array(d), np.array(side))
+    return DeadZoneMotion(np.array(d), half)

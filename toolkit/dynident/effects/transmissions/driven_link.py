@@ -6,7 +6,8 @@ link's motion, at the samples of a recording and in steps that follow the fastes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from bisect import bisect_left
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ _SHORTEST = 4e-5
 """s: the stiffest transmission on the lightest link that is possible asks for longer steps."""
 _RUNG_DOWN = np.log(100.0)
 """Decades of a start that a run-up takes away, as a logarithm."""
+_PACES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
+"""Steps in a sample, or a multiple of the last: few, so that many shapes share them."""
 _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
 
@@ -82,20 +85,19 @@ class DrivenLink:
         # A record that is shorter than its period does not hold what came before it.
         whole = 0 if block.period is None else round(block.period / self.step)
         self.period = whole if whole <= len(block.t) else 0
-        self._fine: tuple[tuple[int, int], Fine] | None = None
+        self._fine: dict[int, Fine] = {}
         self.latest: tuple[Transmitting, Any] | None = None
 
-    def fine(self, per: int, before: np.ndarray) -> Fine:
-        """Return the link's motion in finer steps, the latest as it was made.
+    def fine(self, gear: Transmitting) -> Fine:
+        """Return the link's motion in steps that follow the oscillation behind a transmission."""
+        if not self.follows(gear):
+            return self._in_steps(1).begun(0)
+        return self._in_steps(_paced(self._steps_per_sample(gear))).begun(self._run_up(gear))
 
-        Parameters
-        ----------
-        per, before : as for `Fine.of`; rows before are those of `run_up`, told by their number.
-        """
-        asked = (per, len(before))
-        if self._fine is None or self._fine[0] != asked:
-            self._fine = asked, Fine.of(self, per, before)
-        return self._fine[1]
+    def _in_steps(self, per: int) -> Fine:
+        if per not in self._fine:
+            self._fine[per] = Fine.of(self, per)
+        return self._fine[per]
 
     def behind(self, gear: Transmitting) -> np.ndarray:
         """Return the inertia behind a transmission, (T,): no less than a part of the mean."""
@@ -106,29 +108,35 @@ class DrivenLink:
         """The least inertia behind a transmission: a part of the mean, kg m^2 or kg."""
         return _LEAST * self.inertia
 
-    def steps_per_sample(self, gear: Transmitting) -> int:
-        """Return how many steps of the recursion follow an oscillation well enough."""
-        stiffest = max(gear.stiffness + self._most_stiffness, 0.0)
-        fastest = np.sqrt(stiffest / max(self._least_whole - gear.rotor, self.least_inertia))
-        return max(1, int(np.ceil(fastest * self.step / _PHASE)))
-
     def follows(self, gear: Transmitting) -> bool:
         """Return whether steps of a sensible length follow it: not where an inertia is impossible.
 
         A wrong estimate may leave next to no inertia at a joint, or less than none.
         """
-        return self.step / self.steps_per_sample(gear) >= min(_SHORTEST, self.step)
+        return self.step / self._steps_per_sample(gear) >= min(_SHORTEST, self.step)
 
-    def run_up(self, gear: Transmitting) -> np.ndarray:
-        """Return rows of the motion that came before the first, as it repeats itself.
+    def _steps_per_sample(self, gear: Transmitting) -> int:
+        """Return how many steps of the recursion follow an oscillation well enough."""
+        stiffest = max(gear.stiffness + self._most_stiffness, 0.0)
+        fastest = np.sqrt(stiffest / max(self._least_whole - gear.rotor, self.least_inertia))
+        return max(1, int(np.ceil(fastest * self.step / _PHASE)))
 
-        As many as the ringing takes that a start at rest gives rise to; none where nothing repeats.
+    def _run_up(self, gear: Transmitting) -> int:
+        """Return how many samples are run through before the first, where the motion repeats.
+
+        As many as the ringing takes that a start at rest gives rise to, up to two periods.
         """
         decay = gear.damping / (2.0 * (self.inertia - gear.rotor))  # per s
         if not (self.period and decay > 0):
-            return np.zeros(0, dtype=int)
-        wanted = min(int(np.ceil(_RUNG_DOWN / (decay * self.step))), 2 * self.period)
-        return np.arange(-wanted, 0) % self.period
+            return 0
+        return min(int(np.ceil(_RUNG_DOWN / (decay * self.step))), 2 * self.period)
+
+
+def _paced(steps: int) -> int:
+    """Return the least of the paces that has as many steps."""
+    if steps > _PACES[-1]:
+        return -(-steps // _PACES[-1]) * _PACES[-1]
+    return _PACES[bisect_left(_PACES, steps)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -137,13 +145,12 @@ class Fine:
 
     Attributes
     ----------
-    rows, first : (R,) samples that are run through, and where those of the motion begin in them.
+    first : samples of the run-up.
     per, step : steps per sample, and their length in s.
     whole, c, g, load, a : inertia of all that moves, damping and stiffness without a transmission,
         torque where nothing gives way, and acceleration of the motor.
     """
 
-    rows: np.ndarray
     first: int
     per: int
     step: float
@@ -154,15 +161,9 @@ class Fine:
     a: np.ndarray
 
     @classmethod
-    def of(cls, link: DrivenLink, per: int, before: np.ndarray) -> Fine:
-        """Return a link's motion in finer steps.
-
-        Parameters
-        ----------
-        link : along the motion of a recording.
-        per : steps per sample.
-        before : (R,) rows of the motion that are run through first.
-        """
+    def of(cls, link: DrivenLink, per: int) -> Fine:
+        """Return a link's motion in so many steps a sample, after the longest of run-ups."""
+        before = np.arange(-2 * link.period, 0) % max(link.period, 1)
         rows, j = np.concatenate([before, np.arange(len(link.a))]), link.joint
         samples = np.stack([link.C[:, j], link.G[:, j], link.load, link.a], axis=1)[rows]
         # Without kinks, which a second derivative would show; but an inertia stays positive.
@@ -173,7 +174,6 @@ class Fine:
                 np.arange((len(rows) - 1) * per + 1) / per, np.arange(len(rows)), whole
             )
         return cls(
-            rows=rows,
             first=len(before),
             per=per,
             step=link.step / per,
@@ -183,3 +183,9 @@ class Fine:
             load=load,
             a=a,
         )
+
+    def begun(self, before: int) -> Fine:
+        """Return the same after a shorter run-up, of so many samples."""
+        dropped = (self.first - before) * self.per
+        late = {one: getattr(self, one)[dropped:] for one in ("whole", "c", "g", "load", "a")}
+        return replace(self, first=before, **late)

@@ -70,13 +70,20 @@ class FlexibleJoint(Forceless):
         return f"resonates at {resonance:.3g} Hz, above the {most:.3g} Hz that the samples tell"
 
     def columns(self, block: Block) -> np.ndarray:
-        return self._column(self._link(block))
+        return self._column_of(self._response(self._link(block))[1])
 
     def family(
         self, variants: Sequence[FlexibleJoint], blocks: Sequence[Block]
     ) -> list[list[np.ndarray]]:
-        # One after the other, each in the steps that its own resonance asks for.
-        return [[one._column(link) for one in variants] for link in map(self._link, blocks)]
+        links = [self._link(block) for block in blocks]
+        gears = [
+            [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
+            for link in links
+        ]
+        return [
+            [one._column_of(response) for one, response in zip(variants, each, strict=True)]
+            for each in responses(links, gears)
+        ]
 
     def sensitivities(self, block: Block) -> np.ndarray:
         gear, response = self._response(self._link(block))
@@ -97,9 +104,8 @@ class FlexibleJoint(Forceless):
     def _link(self, block: Block) -> DrivenLink:
         return driven_link(block, block.index(self.joint))
 
-    def _column(self, link: DrivenLink) -> np.ndarray:
-        gear, response = self._response(link)
-        return (self.per_unit(gear.stiffness) * response.torque)[:, :, None]
+    def _column_of(self, response: Response) -> np.ndarray:
+        return (self.per_unit(response.gear.stiffness) * response.torque)[:, :, None]
 
     def _response(self, link: DrivenLink) -> tuple[Transmitting, Response]:
         gear = Transmitting.of(link.inertia, self.shape, self.gap)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -45,27 +45,23 @@ class Deflection:
 
 def responses(
     links: Sequence[DrivenLink], gears: Sequence[Sequence[Transmitting]]
-) -> list[list[Response]]:
-    """Return how each link moves behind each of its transmissions; all dead zones in one walk."""
-    made = []
-    for link, each in zip(links, gears, strict=True):
-        followed = [gear for gear in each if link.follows(gear)]
-        per = max(map(link.steps_per_sample, followed), default=1)
-        before = max((link.run_up(gear) for gear in followed), key=len, default=np.zeros(0, int))
-        fine = link.fine(per, before)
-        made.append(
-            [(Response if link.follows(gear) else Unmoved)(link, fine, gear) for gear in each]
-        )
-    gaps = [
-        one
-        for each in made
-        for one in each
-        if one.gear.half_gap > 0 and not isinstance(one, Unmoved)
-    ]
-    if gaps:
-        for one, walked in zip(gaps, through_dead_zones([g.driven for g in gaps]), strict=True):
-            one.walked = walked
-    return made
+) -> Iterable[Iterable[Response]]:
+    """Return how each link moves behind each of its transmissions; all dead zones in one walk.
+
+    Where there are none, each is made when it is asked for: together they take much memory.
+    """
+    made = (map(partial(_behind, link), each) for link, each in zip(links, gears, strict=True))
+    if not any(gear.half_gap > 0 for each in gears for gear in each):
+        return made
+    every = [list(each) for each in made]
+    walking = [one for each in every for one in each if one.walks]
+    for one, walked in zip(walking, through_dead_zones([w.driven for w in walking]), strict=True):
+        one.walked = walked
+    return every
+
+
+def _behind(link: DrivenLink, gear: Transmitting) -> Response:
+    return (Response if link.follows(gear) else Unmoved)(link, link.fine(gear), gear)
 
 
 class Response:
@@ -77,8 +73,7 @@ class Response:
 
     Attributes
     ----------
-    m, load : (S,) inertia behind the transmission, and the torque that the link needs where nothing
-        gives way.
+    driven : the link in the steps of its recursion.
     walked : the deflection of a link in a dead zone, found step by step; None without a gap.
     """
 
@@ -87,20 +82,22 @@ class Response:
         # Not the link itself, which keeps its latest response.
         self._joint, self._least = link.joint, link.least_inertia
         self._by, self._behind = (link.M, link.C, link.G), link.behind(gear)
-        # In place: a search makes thousands of these, and memory that is new costs most.
-        self.m = fine.whole - gear.rotor
-        np.maximum(self.m, link.least_inertia, out=self.m)
-        self.load = gear.rotor * fine.a
-        np.subtract(fine.load, self.load, out=self.load)
+        self.driven = DeadZoneLink(
+            whole=fine.whole,
+            needed=fine.load,
+            a=fine.a,
+            c=fine.c,
+            g=fine.g,
+            gear=gear,
+            least=link.least_inertia,
+            step=fine.step,
+        )
         self.walked: DeadZoneMotion | None = None
 
     @property
-    def driven(self) -> DeadZoneLink:
-        """The same for the recursion in time."""
-        fine = self._fine
-        return DeadZoneLink(
-            m=self.m, load=self.load, c=fine.c, g=fine.g, gear=self.gear, step=fine.step
-        )
+    def walks(self) -> bool:
+        """Whether its dead zone is to be walked through in time."""
+        return self.gear.half_gap > 0
 
     @cached_property
     def torque(self) -> np.ndarray:
@@ -109,26 +106,26 @@ class Response:
 
     @cached_property
     def _side(self) -> np.ndarray:
-        return np.zeros(len(self.m)) if self.walked is None else self.walked.side
+        return np.zeros(len(self._fine.a)) if self.walked is None else self.walked.side
 
     @cached_property
     def _touches(self) -> np.ndarray:
-        return np.ones(len(self.m)) if self.walked is None else np.abs(self._side)
+        return np.ones(len(self._fine.a)) if self.walked is None else np.abs(self._side)
 
     @cached_property
     def _rests(self) -> np.ndarray:
-        return np.zeros(2) if self.walked is None else _sign(self.load[:2])
+        return np.zeros(2) if self.walked is None else _sign(self.driven.resting)
 
     @cached_property
     def _d(self) -> np.ndarray:
         if self.walked is not None:
             return _bounded(self.walked.d)
-        return self._banded(self.load[:2], self.load)
+        return self._banded(self.driven.load[:2], self.driven.load)
 
     @cached_property
     def _band(self) -> np.ndarray:
         """Row k + 1 holds the equation at step k; the first two are at rest."""
-        m, h, gear = self.m, self._fine.step, self.gear
+        m, h, gear = self.driven.m, self._fine.step, self.gear
         damping = self._fine.c + gear.damping * self._touches
         stiffness = self._fine.g + gear.stiffness * self._touches
         rest = self._fine.g + gear.stiffness
@@ -216,6 +213,10 @@ class Response:
 
 class Unmoved(Response):
     """The response of a link that no steps of a sensible length follow: it explains nothing."""
+
+    @property
+    def walks(self) -> bool:
+        return False
 
     @cached_property
     def torque(self) -> np.ndarray:
