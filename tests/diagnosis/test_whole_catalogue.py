@@ -129,6 +129,18 @@ def test_a_gap_that_is_given_is_sought_beyond_the_grid(
 
 
 @pytest.mark.slow
+def test_a_gap_that_was_found_is_sought_about_its_shape() -> None:
+    """Bursts have many optima near each other: the first one leaves three halves of the noise."""
+    made = recordings(*truth("backlash@shoulder", (0.0015,), (40.0, 0.073, 0.388)))
+    found = find(PLAIN, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])), propose="never")
+    assert found.verdict == "explained"
+    assert [step.effect.label for step in found.steps] == ["backlash@shoulder"]
+    assert found.after.effect_values("backlash@shoulder")[0] == pytest.approx(0.0015, rel=0.05)
+    assert found.test_error.noise_floor is not None
+    assert found.test_error.after < 1.15 * found.test_error.noise_floor
+
+
+@pytest.mark.slow
 def test_a_gap_is_found_by_its_bursts_where_no_noise_is_known() -> None:
     hidden = truth("backlash@shoulder", (0.0008,), (24.0, 0.5, 0.5))
     made = [one.replace(period=None) for one in recordings(*hidden)]

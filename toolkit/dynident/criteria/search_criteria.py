@@ -331,7 +331,11 @@ class GlobalSearchCriteria(CriteriaGroup):
         24, "shapes", "shapes about which the other recordings are asked", least=1
     )
     refined: int = criterion(
-        3, "shapes", "shapes from which an effect that is given is fitted again", least=1
+        3,
+        "searches",
+        "searches about the best shape found, after each of which an effect that is given is "
+        "fitted again",
+        least=1,
     )
     recordings: int = criterion(
         4, "recordings", "recordings on which what fits one alone is sought again", least=1
@@ -339,8 +343,7 @@ class GlobalSearchCriteria(CriteriaGroup):
     holds: float = criterion(
         0.9,
         "1",
-        "share explained of all recordings over that of one, below which it fits that one alone; "
-        "and of another shape's over the best one's, below which it is not fitted again",
+        "share explained of all recordings over that of one, below which it fits that one alone",
         least=0,
         most=1,
     )

@@ -62,7 +62,11 @@ def extend(stage: Stage, task: DiagnosisTask, elsewhere: Collection[Waypoint] = 
     ----------
     stage : the model with its latest ranking.
     task : what is asked; how many effects may be added, among others.
-    elsewhere : models from which other ways went on: it ends at one of them, not ranked again.
+    elsewhere : models from which other ways went on.
+
+    Returns
+    -------
+    The model with its last ranking; or, not ranked again, with all that one of the others has.
     """
     while stage.proposals < task.most:
         many = len(stage.found)

@@ -14,9 +14,10 @@ from dynident.diagnosis.extension.extending import (
 )
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
-from dynident.diagnosis.search.global_search import global_search
+from dynident.diagnosis.search.global_search import global_search, may_be_elsewhere
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.selection import AddedEffect
+from dynident.diagnosis.search.shaped_fit import sought_about
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -41,9 +42,24 @@ def by_other_ways(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
     extended : with what the straight way has added.
     task : what is asked.
     """
-    for way in (_searched_globally, _by_another_beginning, _by_two_at_once):
+    for way in (_with_other_shapes, _searched_globally, _by_another_beginning, _by_two_at_once):
         extended = way(start, extended, task)
     return extended
+
+
+def _with_other_shapes(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
+    """Seek other shapes of what was added and comes in bursts, and extend the model from there."""
+    evidence, fitted = extended.evidence, extended.fitted
+    added = {one.score.effect.label for one in extended.found}
+    for effect in () if start.loop.runs else extended.fitted.model.effects:
+        if effect.label in added and may_be_elsewhere(evidence, fitted, effect):
+            task.progress(f"{effect.label}, at other shapes")
+            others = fit_evidence(evidence, fitted.model - effect, fitted)
+            fitted = sought_about(evidence, others, fitted, effect)
+    if fitted is extended.fitted:
+        return extended
+    better = replace(extended, fitted=fitted, rounds=extended.rounds[:-1])
+    return extend(rank_stage(better, task), task)
 
 
 def _searched_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:

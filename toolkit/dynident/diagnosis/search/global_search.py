@@ -20,7 +20,6 @@ from typing import TypeVar
 import numpy as np
 
 from dynident.diagnosis.dependence.bursts import beyond_reversals, bursts_in
-from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
@@ -59,6 +58,9 @@ class RankedModel(FittedModel):
 
     ranking: Ranking
 
+
+_ABOUT = 1.0 / 7.0
+"""Of all shapes and values that are sought, by their logarithms, to either side of those found."""
 
 AnyModel = TypeVar("AnyModel", bound=FittedModel)
 
@@ -101,27 +103,33 @@ def global_search(
     return None
 
 
-def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> tuple[Effect, ...]:
-    """Return an effect at the best of all its shapes and values, and at others nearly as good.
+def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect | None:
+    """Return an effect at the best of all its shapes and values; None where none explains much.
 
     Parameters
     ----------
     evidence : the training recordings.
     fitted : the model without the effect.
     effect : of many shapes, see `Effect.sought_in`.
-
-    Returns
-    -------
-    The best first, each refined; none where none explains much.
     """
     base = FittedModel(evidence=evidence, fitted=fitted)
-    searches, _ = _searched((base,), base, (effect,), (), lambda _: None)
-    # What gives way by bursts has many optima near each other: several are begun from.
-    own = evidence.criteria.global_search
-    begins = _finalists(evidence, fitted, searches)[: own.refined]
-    found = [refined(evidence, fitted, one) for one in begins]
-    found.sort(key=lambda one: -one.fall)
-    return tuple(one.effect for one in found if one.fall >= own.holds * found[0].fall)
+    _, found = _searched((base,), base, (effect,), (), lambda _: None)
+    return found[0][1].effect if found else None
+
+
+def best_about(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect | None:
+    """Return an effect at the best of the shapes and values about its own; None where none is.
+
+    What comes in bursts has many optima near each other, in which a search with derivatives ends.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model without the effect.
+    effect : as for `best_anywhere`, with a shape and the value at which its column is taken.
+    """
+    found = _shapes_about(evidence, fitted, effect)
+    return found.best[0].found.effect if found.best else None
 
 
 def _searched(
@@ -291,8 +299,30 @@ def _shapes_on(
     evidence: Evidence, fitted: EvidenceFit, effect: Effect
 ) -> ShapeSolution[ScoreTrial]:
     """Search all shapes of an effect, and the values at which its column is taken."""
+    bounds = np.log(effect.sought_in(fitted.model.robot))
+    return _shapes_within(evidence, fitted, effect, bounds, evidence.criteria.global_search.enough)
+
+
+def _shapes_about(
+    evidence: Evidence, fitted: EvidenceFit, effect: Effect
+) -> ShapeSolution[ScoreTrial]:
+    """Search the shapes and values about those that an effect has."""
+    bounds = np.log(effect.sought_in(fitted.model.robot))
+    reach = _ABOUT * np.diff(bounds)
+    at = np.log(np.clip([*effect.shape, *effect.point], *np.exp(bounds).T))[:, None]
+    about = np.clip(at + reach * [-1.0, 1.0], bounds[:, :1], bounds[:, 1:])
+    return _shapes_within(evidence, fitted, effect, about, enough=1.0)
+
+
+def _shapes_within(
+    evidence: Evidence, fitted: EvidenceFit, effect: Effect, bounds: np.ndarray, enough: float
+) -> ShapeSolution[ScoreTrial]:
+    """Search shapes and values of an effect between bounds (s + 1, 2), logarithms.
+
+    Until a share of what the model leaves is explained that is enough.
+    """
     shapes = len(effect.shape_parameters(fitted.model.robot))
-    lower, upper = np.log(effect.sought_in(fitted.model.robot)).T
+    lower, upper = bounds.T
 
     def evaluate(points: Sequence[np.ndarray]) -> list[ScoreTrial]:
         tried = [effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(points)]
@@ -306,7 +336,7 @@ def _shapes_on(
     solver = Evolution(
         population=criteria.population,
         generations=criteria.generations,
-        enough=-criteria.enough * systematic,
+        enough=-enough * systematic,
         hope=-criteria.least * systematic,
         patience=criteria.patience,
         finalists=criteria.finalists,

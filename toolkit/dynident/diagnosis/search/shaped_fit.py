@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
-from dynident.diagnosis.search.global_search import best_anywhere, may_be_elsewhere
+from dynident.diagnosis.search.global_search import best_about, best_anywhere, may_be_elsewhere
+from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
@@ -34,11 +35,33 @@ def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
         if not may_be_elsewhere(evidence, fitted, effect):
             continue
         others = fit_evidence(evidence, fitted.model - effect, fitted)
-        for better in best_anywhere(evidence, others, effect):
-            trial = refitted(evidence, fitted.model.with_shapes((better,)), fitted)
-            fitted = min((fitted, trial), key=lambda one: one.misfit(others))
-            if not may_be_elsewhere(evidence, fitted, effect):
-                break
+        begin = best_anywhere(evidence, others, effect)
+        if begin is not None:
+            fitted = sought_about(evidence, others, fitted, begin)
+    return fitted
+
+
+def sought_about(
+    evidence: Evidence, others: EvidenceFit, fitted: EvidenceFit, begin: Effect
+) -> EvidenceFit:
+    """Return the best fit with an effect at other shapes, each the best about the one before.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    others, fitted : the model without the effect, and with it.
+    begin : the effect with the shape and value about which they are sought first.
+    """
+    for _ in range(evidence.criteria.global_search.refined):
+        near = best_about(evidence, others, begin)
+        if near is None:
+            break
+        trial = refitted(evidence, fitted.model.with_shapes((near,)), fitted)
+        fitted = min((fitted, trial), key=lambda one: one.misfit(others))
+        latest = next(one for one in fitted.model.effects if one.label == begin.label)
+        if latest == begin or not may_be_elsewhere(evidence, fitted, latest):
+            break
+        begin = latest
     return fitted
 
 
