@@ -204,13 +204,14 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
-        before, least = noise, _LEAST * max(torque_std)
-        noise = _measured(evidence, columns, values, before, least)
+        noise = tuple(
+            _no_less(JointResidual.of(evidence, columns, values, j).noise, _LEAST * max(torque_std))
+            for j in range(n)
+        )
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         settled = bool(small) or not model.needs_values
-        kept = all(now is was for now, was in zip(noise, before, strict=True))
-        enough = kept or round >= criteria.noise_rounds - (near is not None)
+        enough = round >= criteria.noise_rounds - (near is not None)
         if enough and (small or fixed_point.stalls):
             break
         at = _held(model, fixed_point.following(model, at, values))
@@ -239,25 +240,15 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     )
 
 
-def _measured(
-    evidence: Evidence, columns, values: np.ndarray, before: Sequence[NoiseModel], least: float
-) -> tuple[NoiseModel, ...]:
-    """Noise of each joint, at least of some size (N m or N).
-
-    What hardly changes stays as it was before: rows that it has whitened are known.
-    """
-    found = []
-    for j, was in enumerate(before):
-        now = JointResidual.of(evidence, columns, values, j).noise
-        now = replace(now, std=least) if now.std < least else now
-        found.append(was if now.is_about(was) else now)
-    return tuple(found)
-
-
 def _torque_rms(evidence: Evidence) -> list[float]:
     """Root mean square of the torque of each joint, in the first replicate of each run."""
     tau = np.concatenate([run.replicates[0].tau for run in evidence.runs])
     return [float(np.sqrt(np.mean(tau[:, j] ** 2))) for j in range(tau.shape[1])]
+
+
+def _no_less(noise: NoiseModel, least: float) -> NoiseModel:
+    """Noise that is at least of some size (N m or N)."""
+    return replace(noise, std=least) if noise.std < least else noise
 
 
 def friction_reach(evidence: Evidence, values: np.ndarray) -> np.ndarray:

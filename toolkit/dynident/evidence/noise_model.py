@@ -17,9 +17,6 @@ from scipy.linalg import solve_toeplitz
 from dynident.criteria import NoiseCriteria
 from dynident.moments.replicates import Kind
 
-_ALIKE = 1e-4
-"""Of its size, by which noise may differ that is taken for the same: of 10 000 samples, which are
-many, a standard deviation is known to 7e-3."""
 _AT_ONCE = 2**15
 """Samples of several signals that are whitened together."""
 
@@ -74,18 +71,6 @@ class NoiseModel:
     def is_flat(self) -> bool:
         """Whether it is white noise of one size: to whiten is then to divide by that."""
         return len(self.colour) == 1 and len(self.scales) == 1
-
-    def is_about(self, other: NoiseModel) -> bool:
-        """Whether another weighs rows alike, to far less than is known of either."""
-        alike = (
-            (self.std * self.scales, other.std * other.scales),
-            (self.speeds, other.speeds),
-            (self.colour, other.colour),
-        )
-        return all(
-            len(own) == len(its) and np.abs(own - its).max() <= _ALIKE * np.abs(its).max()
-            for own, its in alike
-        )
 
     def weights(self, speed: np.ndarray) -> np.ndarray:
         """One over the local standard deviation, (T,), at a joint's velocity (T,)."""
