@@ -44,12 +44,12 @@ def test_a_spring_and_a_rotor_are_found_though_an_offset_comes_first() -> None:
 @pytest.mark.slow
 def test_what_two_ways_come_by_is_extended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Which friction is added first does not matter, and the same is missing beside both."""
-    passed, ways, robot = [], [], gantry().robot
+    visited, ways, robot = [], [], gantry().robot
     given = di.Model(robot) + "viscous_friction@y" + "coulomb_friction@y"
     rank_stage = extending.rank_stage
 
     def ranked(stage: Stage, task: DiagnosisTask, worth: float = 0.0) -> Stage:
-        passed.append(stage.waypoint)
+        visited.append(stage.visiting)
         return rank_stage(stage, task, worth)
 
     def told(doing: str) -> None:
@@ -61,8 +61,8 @@ def test_what_two_ways_come_by_is_extended_once(monkeypatch: pytest.MonkeyPatch)
     assert {step.effect.label for step in said.steps} == FRICTIONS
     assert said.verdict == "unexplained"
     assert ways[0] == "going another way than by viscous_friction@x"
-    assert {"coulomb_friction@x"} in [one.effects for one in passed]
-    assert sum(one.effects == FRICTIONS for one in passed) == 1
+    assert {"coulomb_friction@x"} in [one.effects for one in visited]
+    assert sum(one.effects == FRICTIONS for one in visited) == 1
 
 
 def jerked() -> Dataset:

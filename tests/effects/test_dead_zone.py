@@ -58,6 +58,20 @@ def test_compiled_is_the_replay_to_the_bit(monkeypatch) -> None:
         np.testing.assert_array_equal(one.side[:-1], replayed.side[:-1])
 
 
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_one_link_that_leans_on_no_side_is_the_replay_to_the_bit(monkeypatch) -> None:
+    """At rest without load it touches its edge, and no more."""
+    link = replace(links_of_several_lengths()[2], a=np.zeros(STEPS), least=1e-3)
+    t = STEP * np.arange(STEPS)
+    motion = {"whole": np.full(STEPS, 0.1), "needed": np.sin(7.0 * t) ** 3}
+    link = replace(link, c=np.zeros(STEPS), g=np.zeros(STEPS), step=STEP, **motion)
+    (compiled,) = through_dead_zones([link])
+    monkeypatch.setenv("DYNIDENT_COMPILE", "never")
+    (replayed,) = through_dead_zones([link])
+    np.testing.assert_array_equal(compiled.d, replayed.d)
+    assert np.ptp(compiled.side) == 2.0
+
+
 @pytest.mark.parametrize("wish", ["never", "auto"])
 def test_a_link_that_runs_away_does_so_quietly(wish, monkeypatch) -> None:
     """Hanging upside down on a spring too weak to hold it, with hardly any inertia."""

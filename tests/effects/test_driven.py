@@ -126,9 +126,13 @@ def test_the_slope_at_a_gap_is_exact_while_no_contact_changes(gap: float) -> Non
     np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("wish", ["never", "auto"])
 @pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
-def test_a_link_without_inertia_has_no_response_to_follow(name: str) -> None:
+def test_a_link_without_inertia_has_no_response_to_follow(
+    name: str, wish: str, monkeypatch
+) -> None:
     """A wrong estimate may take all inertia from a joint: nothing small enough would follow it."""
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
     inertia = mean_inertia(ROBOT, 1)
     (effect,) = effects_of(f"{name}@elbow", ROBOT)
     variants = [effect, *effect.variants(ROBOT)]
@@ -138,6 +142,19 @@ def test_a_link_without_inertia_has_no_response_to_follow(name: str) -> None:
         for columns in (effect.columns(samples), *each):
             assert columns.shape == (len(samples.t), 2, 1)
             assert np.any(columns) == moves
+
+
+@pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
+def test_shapes_of_unlike_steps_and_run_ups_are_each_shape_alone(name: str) -> None:
+    """Where a motion repeats, what rings long is run through two periods before it begins."""
+    (effect,) = effects_of(f"{name}@elbow", ROBOT)
+    shapes = [(f, d, 0.3) for f in (3.0, 11.0, 40.0, 150.0) for d in (0.03, 0.4)]
+    variants = [effect.shaped(*shape).at([0.002] * len(effect.point)) for shape in shapes]
+    samples = replace(block(4, 250.0), period=0.4)
+    (together,) = cast(Any, effect).family(variants, [samples])
+    for one, found in zip(variants, together, strict=True):
+        alone = one.columns(replace(samples, q=samples.q.copy()))
+        np.testing.assert_array_equal(found, alone)
 
 
 def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:

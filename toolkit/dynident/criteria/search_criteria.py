@@ -339,8 +339,7 @@ class GlobalSearchCriteria(CriteriaGroup):
     refined: int = criterion(
         3,
         "searches",
-        "searches about the best shape found, after each of which an effect that is given is "
-        "fitted again",
+        "searches about the best shape found, after each of which the model is fitted again",
         least=1,
     )
     recordings: int = criterion(

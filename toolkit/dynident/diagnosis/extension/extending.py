@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.diagnosis.extension.reversals import as_much, without_their_reversals
-from dynident.diagnosis.extension.stage import DiagnosisTask, Stage, Waypoint
+from dynident.diagnosis.extension.stage import DiagnosisTask, Stage, VisitedModel
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
@@ -51,11 +51,11 @@ def rank_stage(stage: Stage, task: DiagnosisTask, worth: float = 0.0) -> Stage:
     found = tuple(
         alternatives_only(one, ranking) if one in stage.latest else one for one in stage.found
     )
-    passed = (*stage.passed, stage.waypoint)
-    return replace(stage, found=found, rounds=(*stage.rounds, ranking), passed=passed)
+    visited = (*stage.visited, stage.visiting)
+    return replace(stage, found=found, rounds=(*stage.rounds, ranking), visited=visited)
 
 
-def extend(stage: Stage, task: DiagnosisTask, elsewhere: Collection[Waypoint] = ()) -> Stage:
+def extend(stage: Stage, task: DiagnosisTask, elsewhere: Collection[VisitedModel] = ()) -> Stage:
     """Add the best effect, refit, and rank again, until none passes every gate.
 
     Parameters
@@ -77,9 +77,9 @@ def extend(stage: Stage, task: DiagnosisTask, elsewhere: Collection[Waypoint] = 
     return stage
 
 
-def joins(stage: Stage, elsewhere: Collection[Waypoint]) -> bool:
+def joins(stage: Stage, elsewhere: Collection[VisitedModel]) -> bool:
     """Whether a model is one by which another way has come."""
-    return bool(elsewhere) and any(map(stage.waypoint.is_same, elsewhere))
+    return bool(elsewhere) and any(map(stage.visiting.is_same, elsewhere))
 
 
 def with_one_more(stage: Stage, task: DiagnosisTask) -> Stage:

@@ -14,8 +14,10 @@ from dynident.diagnosis.extension.extending import (
 )
 from dynident.diagnosis.extension.reversals import left_out
 from dynident.diagnosis.extension.stage import DiagnosisTask, Stage
+from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.search.global_search import global_search, may_be_elsewhere
-from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.ranking import Ranking, unresolved
+from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.search.shaped_fit import sought_about
 from dynident.diagnosis.verdict import within_noise
@@ -34,7 +36,7 @@ _WAYS = 4  # that are gone at most, each from another effect of the first round
 
 
 def by_other_ways(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
-    """Return the model that the global search, or another beginning, extends further; or the same.
+    """Return the model that other shapes, or another beginning, extend further; or the same.
 
     Parameters
     ----------
@@ -48,15 +50,18 @@ def by_other_ways(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
 
 
 def _with_other_shapes(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
-    """Seek other shapes of what was added and comes in bursts, and extend the model from there."""
+    """Seek what was added about its shape, where a residual is left, and extend the model again."""
+    if start.loop.runs:  # simulated motions are renewed as the model grows
+        return extended
     evidence, fitted = extended.evidence, extended.fitted
-    added = {one.score.effect.label for one in extended.found}
-    for effect in () if start.loop.runs else extended.fitted.model.effects:
-        if effect.label in added and may_be_elsewhere(evidence, fitted, effect):
-            task.progress(f"{effect.label}, at other shapes")
-            others = fit_evidence(evidence, fitted.model - effect, fitted)
-            fitted = sought_about(evidence, others, fitted, effect)
-    if fitted is extended.fitted:
+    for label in [one.score.effect.label for one in extended.found]:
+        effect = next(one for one in fitted.model.effects if one.label == label)
+        if may_be_elsewhere(evidence, fitted, effect):
+            task.progress(f"{label}, at other shapes")
+            other = with_friction_width(evidence, sought_about(evidence, fitted, effect))
+            why = newly_impossible(evidence, extended.fitted, other)
+            fitted = fitted if why or unresolved(evidence, other, label) else other
+    if not fitted.misfit(start.start) < extended.fitted.misfit(start.start):
         return extended
     better = replace(extended, fitted=fitted, rounds=extended.rounds[:-1])
     return extend(rank_stage(better, task), task)
@@ -77,7 +82,7 @@ def _searched_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> St
         return extended
     base = extended if missed.fitted is extended.fitted else first
     headed = replace(base, rounds=(*base.rounds[:-1], missed.ranking))
-    other = extend(headed, task, extended.passed)
+    other = extend(headed, task)
     better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
     return other if better and set(other.doubtful) == set(extended.doubtful) else extended
 
@@ -91,7 +96,7 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
     """
     if not _leaves_a_residual(start, extended):
         return extended
-    best, latest, refused, passed = extended, extended, {}, extended.passed
+    best, latest, refused, visited = extended, extended, {}, extended.visited
     most = _MUCH_LESS * extended.fitted.misfit(start.start)
     for _ in range(_WAYS):
         if not latest.found:
@@ -102,10 +107,10 @@ def _by_another_beginning(start: Stage, extended: Stage, task: DiagnosisTask) ->
         if not ranking.passing:
             break
         task.progress(f"going another way than by {begun}")
-        latest = extend(_from(start, ranking), task, passed)
-        if joins(latest, passed):  # from there it ends where the other way has ended
+        latest = extend(_from(start, ranking), task, visited)
+        if joins(latest, visited):  # from there it ends where the other way has ended
             continue
-        passed = (*passed, *latest.passed)
+        visited = (*visited, *latest.visited)
         left = latest.fitted.misfit(start.start)
         if left < most and set(latest.doubtful) == set(extended.doubtful):
             best, most = latest, left

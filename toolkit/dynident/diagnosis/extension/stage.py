@@ -42,22 +42,22 @@ _SAME_MISFIT = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Waypoint:
+class VisitedModel:
     """A model by which a search has come.
 
     Attributes
     ----------
     effects : labels of what was added.
     doubtful : joints of which rows were left out.
-    misfit : share of what the model as given leaves.
+    misfit : over the model as given, see `EvidenceFit.misfit`.
     """
 
     effects: frozenset[str]
     doubtful: frozenset[str]
     misfit: float
 
-    def is_same(self, other: Waypoint) -> bool:
-        """Whether it is the same model, whatever was added first: the same follows from it."""
+    def is_same(self, other: VisitedModel) -> bool:
+        """Whether it is the same model, whatever was added first: the same is missing from it."""
         alike = self.effects == other.effects and self.doubtful == other.doubtful
         return alike and abs(self.misfit - other.misfit) <= _SAME_MISFIT * abs(other.misfit)
 
@@ -76,7 +76,7 @@ class Stage:
     start, fitted : fits of the model as given, and of the one with all effects added.
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
-    passed : the models that were ranked.
+    visited : the models that were ranked.
     refused : labels of effects that were withdrawn, with the reason: they are not tried again.
     doubtful : joints whose dry friction may follow another law at their reversals, with the speed
         (rad/s or m/s) within which rows were left out for that.
@@ -92,7 +92,7 @@ class Stage:
     fitted: EvidenceFit
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
-    passed: tuple[Waypoint, ...] = ()
+    visited: tuple[VisitedModel, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
     doubtful: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -111,9 +111,9 @@ class Stage:
         )
 
     @property
-    def waypoint(self) -> Waypoint:
-        """The model as a place that other ways may come by, too."""
-        return Waypoint(
+    def visiting(self) -> VisitedModel:
+        """The model, as other ways may come by it, too."""
+        return VisitedModel(
             effects=frozenset(one.score.effect.label for one in self.found),
             doubtful=frozenset(self.doubtful),
             misfit=self.fitted.misfit(self.start),

@@ -2,8 +2,9 @@
 
 A response with backlash fits where its shape is nearly the true one and nowhere else: the few
 shapes of the grid may all miss it. Differential evolution seeks it on one recording, all shapes of
-a generation in the same steps of time; all recordings are asked about the best that it finds. Where
-a link rattles, a wrong shape may fit one recording and no other: then it is sought on some at once.
+a generation at once; all recordings are asked about the best that it finds. Where a link rattles, a
+wrong shape may fit one recording and no other: then it is sought on some at once. About the best
+there are others nearly as good: what is in a model is sought among them again, on all recordings.
 What tells a true one is that the value found is the one at which its column was taken, which no
 accident brings about.
 
@@ -60,7 +61,8 @@ class RankedModel(FittedModel):
 
 
 _ABOUT = 1.0 / 7.0
-"""Of all shapes and values that are sought, by their logarithms, to either side of those found."""
+"""Of all shapes and values that are sought, by their logarithms, to either side of those found.
+Measured on 20 gaps: with a tenth one is missed by more than 5 %, with a seventh none."""
 
 AnyModel = TypeVar("AnyModel", bound=FittedModel)
 
@@ -118,7 +120,7 @@ def best_anywhere(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Ef
 
 
 def best_about(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect | None:
-    """Return an effect at the best of the shapes and values about its own; None where none is.
+    """Return an effect at the best of the shapes and values about its own, whatever it explains.
 
     What comes in bursts has many optima near each other, in which a search with derivatives ends.
 
@@ -126,7 +128,11 @@ def best_about(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effec
     ----------
     evidence : the training recordings.
     fitted : the model without the effect.
-    effect : as for `best_anywhere`, with a shape and the value at which its column is taken.
+    effect : as for `best_anywhere`, with the value at which its column is taken.
+
+    Returns
+    -------
+    None where no possible one explains anything.
     """
     found = _shapes_about(evidence, fitted, effect)
     return found.best[0].found.effect if found.best else None
@@ -306,11 +312,13 @@ def _shapes_on(
 def _shapes_about(
     evidence: Evidence, fitted: EvidenceFit, effect: Effect
 ) -> ShapeSolution[ScoreTrial]:
-    """Search the shapes and values about those that an effect has."""
-    bounds = np.log(effect.sought_in(fitted.model.robot))
-    reach = _ABOUT * np.diff(bounds)
-    at = np.log(np.clip([*effect.shape, *effect.point], *np.exp(bounds).T))[:, None]
-    about = np.clip(at + reach * [-1.0, 1.0], bounds[:, :1], bounds[:, 1:])
+    """Search the shapes and values about those that an effect has, in all recordings."""
+    low, high = np.log(effect.sought_in(fitted.model.robot)).T
+    at = np.log(np.maximum([*effect.shape, *effect.point], np.exp(low)))
+    reach = _ABOUT * (high - low)
+    # A fit may have led beyond what is sought.
+    ends = np.maximum(at - reach, low), np.minimum(at + reach, np.maximum(at, high))
+    about = np.stack(ends, axis=1)
     return _shapes_within(evidence, fitted, effect, about, enough=1.0)
 
 

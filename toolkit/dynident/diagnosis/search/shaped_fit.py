@@ -37,27 +37,27 @@ def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
         others = fit_evidence(evidence, fitted.model - effect, fitted)
         begin = best_anywhere(evidence, others, effect)
         if begin is not None:
-            fitted = sought_about(evidence, others, fitted, begin)
+            fitted = sought_about(evidence, fitted, begin)
     return fitted
 
 
-def sought_about(
-    evidence: Evidence, others: EvidenceFit, fitted: EvidenceFit, begin: Effect
-) -> EvidenceFit:
+def sought_about(evidence: Evidence, fitted: EvidenceFit, begin: Effect) -> EvidenceFit:
     """Return the best fit with an effect at other shapes, each the best about the one before.
 
     Parameters
     ----------
     evidence : the training recordings.
-    others, fitted : the model without the effect, and with it.
+    fitted : the model with the effect.
     begin : the effect with the shape and value about which they are sought first.
     """
+    first = fitted
     for _ in range(evidence.criteria.global_search.refined):
+        others = fit_evidence(evidence, fitted.model - begin, fitted)
         near = best_about(evidence, others, begin)
         if near is None:
             break
         trial = refitted(evidence, fitted.model.with_shapes((near,)), fitted)
-        fitted = min((fitted, trial), key=lambda one: one.misfit(others))
+        fitted = min((fitted, trial), key=lambda one: one.misfit(first))
         latest = next(one for one in fitted.model.effects if one.label == begin.label)
         if latest == begin or not may_be_elsewhere(evidence, fitted, latest):
             break

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from dynident.effects.effect import Parameter, motion_unit
+from dynident.effects.effect import Block, Parameter, motion_unit
 from dynident.effects.transmissions.along import mean_inertia
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
+from dynident.effects.transmissions.link_response import responses
 
 _GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025, 0.05)
 """rad (a tenth of it in m): gaps that are screened."""
@@ -71,9 +72,19 @@ class Backlash(FlexibleJoint):
         given = self.point[0] if self.point else 0.0
         return max(given, _LEAST) if given > 0 else _USUAL
 
+    def family(
+        self, variants: Sequence[Backlash], blocks: Sequence[Block]
+    ) -> list[list[np.ndarray]]:
+        links = [self._link(block) for block in blocks]
+        gears = [[one._gear(link) for one in variants] for link in links]
+        return [
+            [one._column(found) for one, found in zip(variants, each, strict=True)]
+            for each in responses(links, gears)
+        ]
+
     def point_slope(self, block):
-        _, response = self._response(self._link(block))
-        return response.by(0.0, 0.0, 0.0, half_gap=0.5)[:, :, None]
+        found = self._response(self._link(block))
+        return found.by(0.0, 0.0, 0.0, half_gap=0.5)[:, :, None]
 
     def per_unit(self, stiffness):
         return 1.0 / self.gap

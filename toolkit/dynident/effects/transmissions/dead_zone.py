@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -112,11 +112,13 @@ class DeadZoneMotion:
 
 def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     """Return how links move in dead zones."""
+    if not links:
+        return []
     walk = c_function(SOURCE, ENTRY)
     if walk is None:
         return _replayed(links)
     found: dict[int, DeadZoneMotion] = {}
-    # Links of about as many steps walk together: none waits for others.
+    # Links of about as many steps walk together: few wait for others.
     order = sorted(range(len(links)), key=lambda v: len(links[v].a))
     for some in _parts(order, LANES):
         found |= zip(some, _compiled(walk, [links[v] for v in some]), strict=True)
@@ -135,13 +137,7 @@ def _compiled(walk: Any, links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
         for link in lanes
         for x in (link.whole, link.needed, link.a, link.c, link.g)
     ]
-    values = np.array(
-        [
-            (one.stiffness, one.damping, one.half_gap, one.rotor, link.least, link.step)
-            for link in lanes
-            for one in (link.gear,)
-        ]
-    ).T.copy()
+    values = np.array([(*astuple(link.gear), link.least, link.step) for link in lanes]).T.copy()
     moved = [DeadZoneMotion(np.empty(len(link.a)), link.gear.half_gap) for link in links]
     written = [one.d for one in (*moved, *[moved[-1]] * (LANES - len(links)))]
     walk(
@@ -249,9 +245,9 @@ def _walk(r: _Recursion) -> DeadZoneMotion:
     d = [before, now, *[0.0] * (len(load) - 2)]
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
-        if now >= half:
+        if now > half:
             after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
-        elif now <= -half:
+        elif now < -half:
             after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
         else:
             after = pushed * free[k] - free_back[k] * before

@@ -6,7 +6,6 @@ link's motion, at the samples of a recording and in steps that follow the fastes
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,8 +23,8 @@ _SHORTEST = 4e-5
 """s: the stiffest transmission on the lightest link that is possible asks for longer steps."""
 _RUNG_DOWN = np.log(100.0)
 """Decades of a start that a run-up takes away, as a logarithm."""
-_PACES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
-"""Steps in a sample, or a multiple of the last: few, so that many shapes share them."""
+_KEPT = 400_000
+"""Steps of a motion, of all lengths that are kept of it: 16 MB."""
 _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
 
@@ -62,8 +61,8 @@ class DrivenLink:
     step, period : s between samples; samples after which the motion repeats, 0 where it does not
         within the recording.
     M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
-    latest : the transmission behind which its response was asked for last, and that response, as
-        `FlexibleJoint` keeps it: a shape's derivatives are those of the same response.
+    latest : its response that was asked for last, as `FlexibleJoint` keeps it: a shape's
+        derivatives are those of the same response.
     """
 
     def __init__(self, block: Block, joint: int) -> None:
@@ -86,17 +85,27 @@ class DrivenLink:
         whole = 0 if block.period is None else round(block.period / self.step)
         self.period = whole if whole <= len(block.t) else 0
         self._fine: dict[int, Fine] = {}
-        self.latest: tuple[Transmitting, Any] | None = None
+        self.latest: Any | None = None
 
     def fine(self, gear: Transmitting) -> Fine:
         """Return the link's motion in steps that follow the oscillation behind a transmission."""
         if not self.follows(gear):
             return self._in_steps(1).begun(0)
-        return self._in_steps(_paced(self._steps_per_sample(gear))).begun(self._run_up(gear))
+        return self._in_steps(self.steps_per_sample(gear)).begun(self._run_up(gear))
+
+    def steps_per_sample(self, gear: Transmitting) -> int:
+        """Return how many steps of the recursion follow an oscillation well enough.
+
+        A power of two or three halves of one: many shapes share their steps.
+        """
+        return _rounded_up(self._least_steps(gear))
 
     def _in_steps(self, per: int) -> Fine:
-        if per not in self._fine:
-            self._fine[per] = Fine.of(self, per)
+        """The motion in so many steps a sample; the latest of them stay."""
+        fine = self._fine.pop(per, None)
+        self._fine[per] = Fine.of(self, per) if fine is None else fine
+        while len(self._fine) > 1 and sum(len(one.a) for one in self._fine.values()) > _KEPT:
+            del self._fine[next(iter(self._fine))]
         return self._fine[per]
 
     def behind(self, gear: Transmitting) -> np.ndarray:
@@ -113,10 +122,9 @@ class DrivenLink:
 
         A wrong estimate may leave next to no inertia at a joint, or less than none.
         """
-        return self.step / self._steps_per_sample(gear) >= min(_SHORTEST, self.step)
+        return self.step / self._least_steps(gear) >= min(_SHORTEST, self.step)
 
-    def _steps_per_sample(self, gear: Transmitting) -> int:
-        """Return how many steps of the recursion follow an oscillation well enough."""
+    def _least_steps(self, gear: Transmitting) -> int:
         stiffest = max(gear.stiffness + self._most_stiffness, 0.0)
         fastest = np.sqrt(stiffest / max(self._least_whole - gear.rotor, self.least_inertia))
         return max(1, int(np.ceil(fastest * self.step / _PHASE)))
@@ -132,11 +140,10 @@ class DrivenLink:
         return min(int(np.ceil(_RUNG_DOWN / (decay * self.step))), 2 * self.period)
 
 
-def _paced(steps: int) -> int:
-    """Return the least of the paces that has as many steps."""
-    if steps > _PACES[-1]:
-        return -(-steps // _PACES[-1]) * _PACES[-1]
-    return _PACES[bisect_left(_PACES, steps)]
+def _rounded_up(steps: int) -> int:
+    """Return the least power of two, or three halves of one, that is as large."""
+    power = 1 << (steps - 1).bit_length()
+    return 3 * power // 4 if power > 2 and 3 * power // 4 >= steps else power
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -13,7 +13,7 @@ from dynident.effects.transmission import Transmission
 from dynident.effects.transmissions.along import mean_inertia, share_of_rotor
 from dynident.effects.transmissions.dead_zone import Transmitting
 from dynident.effects.transmissions.driven_link import DrivenLink, driven_link
-from dynident.effects.transmissions.link_response import Response, responses, stacked
+from dynident.effects.transmissions.link_response import Response, response, stacked
 from dynident.robot import Robot
 
 _SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
@@ -70,48 +70,46 @@ class FlexibleJoint(Forceless):
         return f"resonates at {resonance:.3g} Hz, above the {most:.3g} Hz that the samples tell"
 
     def columns(self, block: Block) -> np.ndarray:
-        return self._column_of(self._response(self._link(block))[1])
+        return self._column(self._response(self._link(block)))
 
     def family(
         self, variants: Sequence[FlexibleJoint], blocks: Sequence[Block]
     ) -> list[list[np.ndarray]]:
-        links = [self._link(block) for block in blocks]
-        gears = [
-            [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
-            for link in links
-        ]
+        # One after the other: what each makes of its motion takes much memory.
         return [
-            [one._column_of(response) for one, response in zip(variants, each, strict=True)]
-            for each in responses(links, gears)
+            [one._column(response(link, one._gear(link))) for one in variants]
+            for link in map(self._link, blocks)
         ]
 
     def sensitivities(self, block: Block) -> np.ndarray:
-        gear, response = self._response(self._link(block))
-        K, D, B = gear.stiffness, gear.damping, gear.rotor
+        found = self._response(self._link(block))
+        K, D, B = found.gear.stiffness, found.gear.damping, found.gear.rotor
         # The shares of motor and link sum to one: what the motor gains, the link has not.
         other = -self.shape[2] / (1.0 - self.shape[2])
-        found = []
+        slopes = []
         for stiffness, damping, rotor in (
             (2 * K, D, 0.0),
             (0.0, D, 0.0),
             (other * K, other * D, B),
         ):
             change = self.per_unit(K + stiffness) - self.per_unit(K)
-            by = response.by(stiffness, damping, rotor)
-            found.append(self.per_unit(K) * by + change * response.torque)
-        return stacked(found)
+            by = found.by(stiffness, damping, rotor)
+            slopes.append(self.per_unit(K) * by + change * found.torque)
+        return stacked(slopes)
 
     def _link(self, block: Block) -> DrivenLink:
         return driven_link(block, block.index(self.joint))
 
-    def _column_of(self, response: Response) -> np.ndarray:
-        return (self.per_unit(response.gear.stiffness) * response.torque)[:, :, None]
+    def _column(self, found: Response) -> np.ndarray:
+        return (self.per_unit(found.gear.stiffness) * found.torque)[:, :, None]
 
-    def _response(self, link: DrivenLink) -> tuple[Transmitting, Response]:
-        gear = Transmitting.of(link.inertia, self.shape, self.gap)
-        if link.latest is None or link.latest[0] != gear:
-            ((response,),) = responses([link], [[gear]])
-            link.latest = gear, response
+    def _gear(self, link: DrivenLink) -> Transmitting:
+        return Transmitting.of(link.inertia, self.shape, self.gap)
+
+    def _response(self, link: DrivenLink) -> Response:
+        gear = self._gear(link)
+        if link.latest is None or link.latest.gear != gear:
+            link.latest = response(link, gear)
         return link.latest
 
     def transmission(self, robot: Robot, stiffness: float, gap: float) -> Transmission:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -43,21 +43,25 @@ class Deflection:
     bend: np.ndarray
 
 
+def response(link: DrivenLink, gear: Transmitting) -> Response:
+    """Return how a link moves behind a transmission."""
+    ((found,),) = responses([link], [[gear]])
+    return found
+
+
 def responses(
     links: Sequence[DrivenLink], gears: Sequence[Sequence[Transmitting]]
-) -> Iterable[Iterable[Response]]:
-    """Return how each link moves behind each of its transmissions; all dead zones in one walk.
-
-    Where there are none, each is made when it is asked for: together they take much memory.
-    """
-    made = (map(partial(_behind, link), each) for link, each in zip(links, gears, strict=True))
-    if not any(gear.half_gap > 0 for each in gears for gear in each):
-        return made
-    every = [list(each) for each in made]
-    walking = [one for each in every for one in each if one.walks]
+) -> list[list[Response]]:
+    """Return how each link moves behind each of its transmissions; all dead zones in one walk."""
+    every = []
+    for link, each in zip(links, gears, strict=True):
+        # Those of one length of steps after each other: not all lengths may be kept.
+        apart = sorted(dict.fromkeys(each), key=link.steps_per_sample)
+        every.append({gear: _behind(link, gear) for gear in apart})
+    walking = [one for made in every for one in made.values() if one.walks]
     for one, walked in zip(walking, through_dead_zones([w.driven for w in walking]), strict=True):
         one.walked = walked
-    return every
+    return [[made[gear] for gear in each] for made, each in zip(every, gears, strict=True)]
 
 
 def _behind(link: DrivenLink, gear: Transmitting) -> Response:
