@@ -30,6 +30,16 @@ def links_of_several_lengths() -> list[DeadZoneLink]:
     return links
 
 
+def equation_of_motion(link: DeadZoneLink, d: np.ndarray) -> np.ndarray:
+    """What a deflection (S,) leaves of m d'' + c d' + g d + transmitted = load, by differences."""
+    now, gear = d[1:-1], link.gear
+    m, c, g, load = (x[1:-1] for x in (link.m, link.c, link.g, link.load))
+    rate, bend = (d[2:] - d[:-2]) / (2.0 * link.step), (d[2:] - 2.0 * now + d[:-2]) / link.step**2
+    beyond = now - np.clip(now, -gear.half_gap, gear.half_gap)
+    transmitted = gear.stiffness * beyond + gear.damping * rate * (beyond != 0.0)
+    return m * bend + c * rate + g * now + transmitted - load
+
+
 @pytest.mark.parametrize("wish", ["never", "auto"])
 def test_several_gaps_at_once_are_each_gap_alone(wish, monkeypatch) -> None:
     monkeypatch.setenv("DYNIDENT_COMPILE", wish)
@@ -37,10 +47,9 @@ def test_several_gaps_at_once_are_each_gap_alone(wish, monkeypatch) -> None:
     for link, together in zip(links, through_dead_zones(links), strict=True):
         (alone,) = through_dead_zones([link])
         np.testing.assert_allclose(together.d, alone.d, rtol=1e-6, atol=1e-9)
-        np.testing.assert_array_equal(together.side[1:-1], alone.side[1:-1])
-        # Inside its gap a link touches nothing, beyond it it does.
-        inner, half = slice(1, -1), link.gear.half_gap
-        np.testing.assert_array_equal(alone.side[inner] != 0, np.abs(alone.d[inner]) > half)
+        # Free inside its gap, held by the transmission beyond it.
+        left = equation_of_motion(link, alone.d)
+        assert np.abs(left).max() < 1e-6 * np.abs(link.load).max()
         assert 0.05 < np.abs(alone.side).mean() < 1.0
 
 
@@ -55,7 +64,6 @@ def test_compiled_is_the_replay_to_the_bit(monkeypatch) -> None:
     monkeypatch.setenv("DYNIDENT_COMPILE", "never")
     for one, replayed in zip(compiled, through_dead_zones(links), strict=True):
         np.testing.assert_array_equal(one.d, replayed.d)
-        np.testing.assert_array_equal(one.side[:-1], replayed.side[:-1])
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -82,4 +90,3 @@ def test_a_link_that_runs_away_does_so_quietly(wish, monkeypatch) -> None:
     links = [DeadZoneLink(gear=one, least=1e-9, **motion) for one in gears]
     for walked in through_dead_zones(links):
         assert not np.isfinite(walked.d).all()
-        assert np.isin(walked.side, (-1.0, 0.0, 1.0)).all()
