@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.signal import lfilter
 
-from dynident.diagnosis.dependence.explained_shares import ExplainedShares, explained_shares
+from dynident.diagnosis.dependence.explained_shares import (
+    ORDER,
+    ExplainedShares,
+    explained_shares,
+)
 from dynident.diagnosis.dependence.joint_inputs import joint_inputs
 from dynident.diagnosis.dependence.motion_blocks import motion_blocks
 from dynident.diagnosis.dependence.residual_record import ResidualRecord
@@ -104,11 +108,17 @@ def record(
     )
 
 
-def shares_of(*records: ResidualRecord, rows: int = 500, noise: float = 0.0) -> ExplainedShares:
+def shares_of(
+    *records: ResidualRecord,
+    rows: int = 500,
+    noise: float = 0.0,
+    order: Sequence[tuple[str, ...]] = ORDER,
+) -> ExplainedShares:
     """Shares at joint 0, with so many rows; `noise` is the mean square that is taken off."""
     blocks, x = motion_blocks(records, [0]), joint_inputs(records, 0)
     e = np.concatenate([one.residual[:, 0] for one in records])
     kept = np.linspace(0, len(e) - 1, rows).round().astype(int)
-    found = explained_shares(x.rows(kept), e[kept], np.full(rows, noise), blocks.units(kept))
+    left, power = e[kept], np.full(rows, noise)
+    found = explained_shares(x.rows(kept), left, power, blocks.units(kept), order)
     assert found is not None
     return found

@@ -78,6 +78,16 @@ def test_a_motion_that_repeats_is_no_way_to_look_up_noise_that_repeats() -> None
     assert claimed <= 1
 
 
+@pytest.mark.parametrize("first", ["told", "nothing"])
+def test_a_set_that_is_asked_again_is_asked_beside_what_is_told_by_then(first: str) -> None:
+    """And is asked once where that is as before."""
+    one = record(3, {bristles: 0.7} if first == "told" else {})
+    either = shares_of(one, rows=300, order=((MOTION, PAST), (MOTION, PAST)))
+    (better, share), (other, _) = either.by.items()
+    assert share.told is (first == "told")
+    assert either == shares_of(one, rows=300, order=((better,), (other,)))
+
+
 def test_with_the_noise_taken_off_shares_are_of_what_is_systematic() -> None:
     one = record(3, {rough_friction: 0.5})
     everything, systematic = shares_of(one), shares_of(one, noise=0.5)

@@ -143,16 +143,19 @@ def explained_shares(
         {},
         np.zeros(len(units)),
     )
+    tried: dict[str, tuple[_KernelFit, np.ndarray]] = {}  # beside what is fitted so far
     for turn in order:
         names = [name for name in turn if name in kernels and name not in by]
         if not names:
             continue
-        tried = {name: _with(kernels[name], fitted, y, units) for name in names}
-        name = min(tried, key=lambda one: tried[one][0].losses.sum())
+        for name in names:
+            if name not in tried:
+                tried[name] = _with(kernels[name], fitted, y, units)
+        name = min(names, key=lambda one: tried[one][0].losses.sum())
         wider, fall = tried[name]
         by[name] = _share(fall, could)
         if by[name].told:
-            fitted, explained = wider, explained + fall
+            fitted, explained, tried = wider, explained + fall, {}
     return ExplainedShares(by=by, rest=_share(could - explained, could), units=len(units))
 
 
