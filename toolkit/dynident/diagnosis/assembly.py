@@ -188,11 +188,10 @@ def _shares(search: Search, joints: Collection[str]) -> dict[str, float]:
 
 def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:
     """The effects of a path, each with the fall of the error that it brings."""
-    by_label = {e.label: e for e in path.final.model.effects}
     names, together = path.final.model.robot.names, evidence.criteria.search.set_block
     return tuple(
         Step(
-            effect=by_label[one.score.effect.label],
+            effect=path.final.model.effect(one.score.effect.label),
             values=tuple(stage.values[stage.model.slices[one.score.effect.label]]),
             test_error_before=old.error,
             test_error_after=new.error,

@@ -79,7 +79,6 @@ def switches_of(evidence: Evidence, held: Evidence | None, path: Path) -> Switch
     """
     if not path.found:
         return None
-    final = {effect.label: effect for effect in path.final.model.effects}
     groups = _groups(path)
     known: dict[int, HeldOut] = {}
     for many in range(len(groups) + 1):
@@ -94,13 +93,14 @@ def switches_of(evidence: Evidence, held: Evidence | None, path: Path) -> Switch
             if on == (True,) * many + (False,) * (len(groups) - many):
                 found[on] = known[many]
             else:
-                fit = _fitted(evidence, path.stages[0], [final[label] for label in labels])
+                effects = list(map(path.final.model.effect, labels))
+                fit = _fitted(evidence, path.stages[0], effects)
                 found[on] = judged_on(evidence, held, fit)
     except FitError:
         return None
     run, rows = _where(path.judged[0], path.judged[-1])
     return Switches(
-        effects=tuple(tuple(final[label] for label in group) for group in groups),
+        effects=tuple(tuple(map(path.final.model.effect, group)) for group in groups),
         choices=tuple(
             SwitchedOn(
                 on=on,

@@ -111,19 +111,22 @@ class ParametrisedRobot:
 
     def __sub__(self, effect: Effect | str) -> Self:
         """Return the model without an effect, given as itself or by its label."""
-        label = effect if isinstance(effect, str) else effect.label
-        kept = tuple(one for one in self.effects if one.label != label)
-        if len(kept) == len(self.effects):
-            raise EffectError("is not in the model", label)
-        return self._with(effects=kept)
+        without = self.effect(effect if isinstance(effect, str) else effect.label)
+        return self._with(effects=tuple(one for one in self.effects if one is not without))
 
     def __contains__(self, effect: Effect | str) -> bool:
         label = effect if isinstance(effect, str) else effect.label
-        return label in self._labels
+        return label in self._by_label
+
+    def effect(self, label: str) -> Effect:
+        """Return the effect of a label, with its shape; EffectError if it is not in the model."""
+        if label not in self._by_label:
+            raise EffectError("is not in the model", label)
+        return self._by_label[label]
 
     @cached_property
-    def _labels(self) -> frozenset[str]:
-        return frozenset(effect.label for effect in self.effects)
+    def _by_label(self) -> dict[str, Effect]:
+        return {effect.label: effect for effect in self.effects}
 
     def with_shapes(self, effects: tuple[Effect, ...]) -> Self:
         """Return the model with these effects in place of those of the same labels."""

@@ -55,7 +55,7 @@ def _with_other_shapes(start: Stage, extended: Stage, task: DiagnosisTask) -> St
         return extended
     evidence, fitted = extended.evidence, extended.fitted
     for label in [one.score.effect.label for one in extended.found]:
-        effect = next(one for one in fitted.model.effects if one.label == label)
+        effect = fitted.model.effect(label)
         if may_be_elsewhere(evidence, fitted, effect):
             task.progress(f"{label}, at other shapes")
             other = with_friction_width(evidence, sought_about(evidence, fitted, effect))
@@ -179,7 +179,7 @@ def _without_its_first(stage: Stage, task: DiagnosisTask) -> Stage:
     """Take out what was added first, and extend the model from what came after it."""
     first, *others = stage.found
     label = first.score.effect.label
-    effect = next(one for one in stage.fitted.model.effects if one.label == label)
+    effect = stage.fitted.model.effect(label)
     rest = fit_evidence(stage.evidence, stage.fitted.model - effect, stage.fitted)
     without = replace(stage, fitted=rest, found=tuple(others), refused={})
     return extend(rank_stage(without, task), task)

@@ -271,7 +271,7 @@ def _with_shapes(evidence: Evidence, fitted: EvidenceFit, joint: str) -> Evidenc
     def missed(x: float) -> float:
         trial = fit_evidence(evidence, model.with_friction_width(joint, float(np.exp(x))), fitted)
         for label in labels:
-            effect = next(e for e in trial.model.effects if e.label == label)
+            effect = trial.model.effect(label)
             others = fit_evidence(evidence, trial.model - effect, trial)
             better = reshaped(evidence, others, trial, effect).effect
             trial = fit_evidence(evidence, trial.model.with_shapes((better,)), trial)

@@ -40,7 +40,7 @@ def unseen_notes(
 
 def _share_seen(evidence: Evidence, fitted: EvidenceFit, label: str) -> float:
     """Largest torque of an effect in rows that count, over that in all rows."""
-    effect = next(one for one in fitted.model.effects if one.label == label)
+    effect = fitted.model.effect(label)
     values = fitted.values[fitted.model.slices[label]]
     joints, counted, every = list(effect.acting_at(fitted.model.robot)), 0.0, 0.0
     for number, run in enumerate(evidence.runs):

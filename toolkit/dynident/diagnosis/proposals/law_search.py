@@ -243,7 +243,7 @@ class LawSearch:
         if after.error >= before.error or explains < criteria.least_share:
             return None
         label = best.effect.label
-        effect = next(one for one in wider.model.effects if one.label == label)
+        effect = wider.model.effect(label)
         assert isinstance(effect, LawEffect)
         own = wider.model.slices[label]
         estimate = estimate_of(self.evidence, wider, self.train)

@@ -194,7 +194,6 @@ def _judged_stages(
     known : what earlier orders of the same effects had in common with this one, which grows.
     """
     start, fitted = ends
-    by_label = {e.label: e for e in fitted.model.effects}
     labels = tuple(one.score.effect.label for one in found)
     for many in range(len(labels) + 1):
         so_far = labels[:many]
@@ -206,7 +205,7 @@ def _judged_stages(
             stage = fitted
         else:
             before = known[so_far[:-1]][0]
-            wider = before.model + by_label[so_far[-1]]
+            wider = before.model + fitted.model.effect(so_far[-1])
             shapes = wider.with_shapes(fitted.model.effects)
             stage = with_friction_width(evidence, fit_evidence(evidence, shapes, before))
         known[so_far] = stage, judged_on(evidence, held, stage)
@@ -242,10 +241,10 @@ def responses_in_place(
     start, final : the model as given, and with all effects, whose shapes are taken.
     found : these effects, in the order in which they were added.
     """
-    by_label = {effect.label: effect for effect in final.model.effects}
 
     def misfit(groups: Sequence[_Group]) -> float:
-        effects = tuple(by_label[one.score.effect.label] for group in groups for one in group)
+        labels = (one.score.effect.label for group in groups for one in group)
+        effects = tuple(map(final.model.effect, labels))
         if not effects:
             return start.misfit(start)
         wider = (start.model + effects).with_shapes(final.model.effects)

@@ -426,6 +426,6 @@ def unresolved(evidence: Evidence, fitted: EvidenceFit, label: str) -> str:
     fitted : the model with the effect.
     label : of the effect.
     """
-    (effect,) = (one for one in fitted.model.effects if one.label == label)
+    effect = fitted.model.effect(label)
     values = fitted.values[fitted.model.slices[label]].tolist()
     return effect.unresolved(values, evidence.longest_step)

@@ -189,7 +189,7 @@ def follows_the_filter(
 def _gram(lower: Evidence, wider: EvidenceFit, effect: Effect) -> np.ndarray:
     """Return the products of an effect's columns behind a lower filter, (k, k): rows that count."""
     own = wider.model.slices[effect.label]
-    whole = next(e for e in wider.model.effects if e.label == effect.label)
+    whole = wider.model.effect(effect.label)
     gram = np.zeros((own.stop - own.start,) * 2)
     joints = list(whole.acting_at(wider.model.robot))
     for number, run in enumerate(lower.runs):

@@ -197,7 +197,7 @@ def without_superfluous(
     for one in found:
         if _belongs(one.score.effect, kept):
             continue
-        effect = next(e for e in fitted.model.effects if e.label == one.score.effect.label)
+        effect = fitted.model.effect(one.score.effect.label)
         rest = fit_evidence(evidence, fitted.model - effect, fitted)
         progress(f"doing without {effect.label}")
         needed = len(kept) == 1 or rank(evidence, rest, len(kept) - 1, only=(effect,)).passing

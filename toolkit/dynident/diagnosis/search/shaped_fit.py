@@ -58,7 +58,7 @@ def sought_about(evidence: Evidence, fitted: EvidenceFit, begin: Effect) -> Evid
             break
         trial = refitted(evidence, fitted.model.with_shapes((near,)), fitted)
         fitted = min((fitted, trial), key=lambda one: one.misfit(first))
-        latest = next(one for one in fitted.model.effects if one.label == begin.label)
+        latest = fitted.model.effect(begin.label)
         if latest == begin or not may_be_elsewhere(evidence, fitted, latest):
             break
         begin = latest
@@ -89,7 +89,7 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
         labels = with_shapes if again == 0 and len(with_shapes) > 1 else driven
         before = fitted
         for label in labels:
-            effect = next(e for e in fitted.model.effects if e.label == label)
+            effect = fitted.model.effect(label)
             others = fit_evidence(evidence, fitted.model - effect, fitted)
             better = reshaped(evidence, others, fitted, effect).effect
             trial = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
@@ -116,7 +116,7 @@ def _from_other_values(
     """
     best = fitted
     for label in labels:
-        effect = next(e for e in fitted.model.effects if e.label == label)
+        effect = fitted.model.effect(label)
         if not effect.point:
             continue
         others = fit_evidence(evidence, fitted.model - effect, fitted)
@@ -137,7 +137,7 @@ def _of_the_time(evidence: Evidence, fitted: EvidenceFit, label: str) -> Evidenc
     criteria, robot = evidence.criteria.shapes, fitted.model.robot
     earlier, last = fitted, np.inf
     for _ in range(criteria.linearisations):
-        effect = next(e for e in fitted.model.effects if e.label == label)
+        effect = fitted.model.effect(label)
         shapes = effect.shape_parameters(robot)
         if not effect.time_varying or len(shapes) != 1:
             break

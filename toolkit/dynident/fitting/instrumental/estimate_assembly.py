@@ -215,7 +215,7 @@ def _held(bias: ExpectedBias) -> np.ndarray:
 
 def _is_dry(model: Model, label: str) -> bool:
     """Whether an effect's columns depend on the width of the friction law."""
-    effect = next(e for e in model.effects if e.label == label)
+    effect = model.effect(label)
     if effect.needs_recording:
         return False
     n = model.robot.n
