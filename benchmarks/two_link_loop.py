@@ -7,7 +7,7 @@ motion and noise of its own; the encoders' noise is fed back. Records begin and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import ceil
 
 import casadi
@@ -120,7 +120,6 @@ class Lab:
         """Measured positions and commanded torques, (S, T, 2) each."""
         S, T, _ = q_ref.shape
         finest = 1.0 / self.rate_hz if self.width >= WIDTH else _STEP
-        loop = _loop(T, self.rate_hz, self.gain, ceil(1.0 / self.rate_hz / finest))
         found = np.empty((S, T, 4))
         laws = (
             self.stribeck,
@@ -131,46 +130,49 @@ class Lab:
             self.rotor,
             self.width,
         )
-        hidden = np.tile(laws, (T, 1))
+        loop = _loop(T, self.rate_hz, self.gain, ceil(1.0 / self.rate_hz / finest), laws)
         for i in range(S):
             start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / self.rate_hz)]
-            _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i], hidden]).T)
+            _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i]]).T)
             found[i] = np.asarray(out).T
         return found[..., :2], found[..., 2:]
 
 
-@cache
-def _loop(samples: int, rate_hz: float, gain: float, steps: int) -> casadi.Function:
+@lru_cache(maxsize=16)
+def _loop(
+    samples: int, rate_hz: float, gain: float, steps: int, laws: tuple[float, ...]
+) -> casadi.Function:
     """The sampled loop, replayed without Python between its samples.
 
     From positions, velocities and the positions measured before, and, a column a sample,
-    references, noise and what is hidden (as in `Lab`); to what is measured and commanded. A command
-    is held for some steps of the classical Runge-Kutta method.
+    references and noise; to what is measured and commanded. A command is held for some steps of the
+    classical Runge-Kutta method. What is hidden (as in `Lab`) are constants: of laws that a robot
+    has not nothing is left to be evaluated.
     """
     x, before = casadi.SX.sym("x", 4), casadi.SX.sym("before", 2)
     q_ref, v_ref, noise = (casadi.SX.sym(name, 2) for name in ("q_ref", "v_ref", "noise"))
-    hidden, h = casadi.SX.sym("hidden", 7), 1.0 / rate_hz / steps
+    h = 1.0 / rate_hz / steps
     y = x[:2] + noise
     tau = casadi.DM(gain * KP) * (q_ref - y) + casadi.DM(gain * KD) * (
         v_ref - (y - before) * rate_hz
     )
     moved = x
     for _ in range(steps):
-        k1 = _rate(moved, tau, hidden)
-        k2 = _rate(moved + h / 2 * k1, tau, hidden)
-        k3 = _rate(moved + h / 2 * k2, tau, hidden)
-        k4 = _rate(moved + h * k3, tau, hidden)
+        k1 = _rate(moved, tau, laws)
+        k2 = _rate(moved + h / 2 * k1, tau, laws)
+        k3 = _rate(moved + h / 2 * k2, tau, laws)
+        k4 = _rate(moved + h * k3, tau, laws)
         moved = moved + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     after = casadi.vertcat(moved, y)
-    given = casadi.vertcat(q_ref, v_ref, noise, hidden)
+    given = casadi.vertcat(q_ref, v_ref, noise)
     states, told = casadi.vertcat(x, before), casadi.vertcat(y, tau)
     return casadi.Function("sample", [states, given], [after, told]).mapaccum(samples)
 
 
-def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
+def _rate(x: casadi.SX, tau: casadi.SX, laws: tuple[float, ...]) -> casadi.SX:
     """Derivative of positions and velocities, (4,)."""
     q1, q2, v1, v2 = casadi.vertsplit(x)
-    share, offset, spring, drag, asymmetry, rotor, width = casadi.vertsplit(hidden)
+    share, offset, spring, drag, asymmetry, rotor, width = laws
     s2, c2 = casadi.sin(q2), casadi.cos(q2)
     across = _LENGTH * (_X2 * c2 - _Y2 * s2)
     slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
@@ -229,7 +231,7 @@ def _references(waves: np.ndarray, t: np.ndarray, slowest: float) -> tuple[np.nd
     order = np.arange(1, 6)
     w = 2 * np.pi / slowest * order
     waves = waves * 0.5 / order
-    sin, cos = np.sin(t[:, None] * w), np.cos(t[:, None] * w)
-    q = np.einsum("tk,sjk->stj", sin, waves[:, 0]) + np.einsum("tk,sjk->stj", cos, waves[:, 1])
-    v = np.einsum("tk,sjk->stj", cos * w, waves[:, 0])
-    return q, v - np.einsum("tk,sjk->stj", sin * w, waves[:, 1])
+    sin, cos = np.sin(t * w[:, None]), np.cos(t * w[:, None])
+    q = waves[:, 0] @ sin + waves[:, 1] @ cos
+    v = waves[:, 0] @ (cos * w[:, None]) - waves[:, 1] @ (sin * w[:, None])
+    return np.swapaxes(q, 1, 2), np.swapaxes(v, 1, 2)
