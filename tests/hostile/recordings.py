@@ -284,9 +284,9 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
         hole(300 << 20),
         r"run\.h5: cannot be read as an HDF5 file",
     ),
-    "a hole of 300 MB as bag": (
+    "a hole of 15 GB as bag": (
         "run.bag",
-        hole(300 << 20),
+        hole(15 << 30),
         r"run\.bag: cannot be read as a bag of ROS",
     ),
     "gzip by its name": (

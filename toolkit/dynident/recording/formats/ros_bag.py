@@ -37,6 +37,8 @@ METADATA = "metadata.yaml"
 """What a folder holds that is a bag of ROS 2."""
 _JOINT_STATE = "sensor_msgs/msg/JointState"
 _COMPLETE = "is the file complete? `rosbag reindex` and `ros2 bag reindex` mend what was cut off"
+_BEGINS = b"#ROSBAG V"
+"""How a file of ROS 1 begins. `rosbags` reads the first line of any file to see, however long."""
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _LEAST_ALLOWED, _MOST_PACKED = 1 << 28, 200
 """A bag unpacks to as many bytes in any case, and to as many for each that is stored."""
@@ -94,10 +96,13 @@ def open_bag(path: Path, layout: FileLayout) -> ColumnTable:
     parts = _storage(path) if path.is_dir() else [path]
     for part in parts:
         with files.open_regular(part) as stream:
-            head = stream.read(1)
+            head = stream.read(len(_BEGINS))
         if not head:
             raise RecordingError("is empty", str(part), "is the file complete?")
     _require_size(path, parts)
+    if path.suffix.lower() == ".bag" and path.is_file() and head != _BEGINS:
+        what = "cannot be read as a bag of ROS (it does not begin as one)"
+        raise RecordingError(what, str(path), _COMPLETE)
     rosbags = _rosbags(str(path))
     with _bounded(str(path), sum(part.stat().st_size for part in parts)):
         found, others = _gathered(rosbags, path, parts, layout.topic)
