@@ -115,7 +115,8 @@ def test_joint_frames_are_where_pinocchio_has_them() -> None:
     model = robot.pinocchio()
     data = model.createData()
     pin.forwardKinematics(model, data, q)  # pyright: ignore[reportAttributeAccessIssue]
-    rotations, origins = poses(robot, q)
+    # Of many postures the second, among which none may take the place of another.
+    rotations, origins = (one[1] for one in poses(robot, np.stack([-q, q, 0 * q])))
     for k, name in enumerate(robot.names):
         placement = data.oMi[model.getJointId(name)]
         np.testing.assert_allclose(rotations[k], placement.rotation, atol=1e-12)
@@ -131,6 +132,8 @@ def test_a_sliding_joint_moves_along_its_axis() -> None:
         <limit lower="0.1" upper="0.5" velocity="1" effort="1"/></joint></robot>"""
     robot = Robot.from_text(text)
     np.testing.assert_allclose(poses(robot, np.array([0.3]))[1], [[0.3, 0.0, 0.2]])
+    two = poses(robot, np.array([[0.3], [0.4]]))[1]
+    np.testing.assert_allclose(two, [[[0.3, 0.0, 0.2]], [[0.4, 0.0, 0.2]]])
     assert drawn(inertia_ellipsoids({"one": robot}))
 
 

@@ -13,8 +13,8 @@ from dynident.study import load
 from dynident.study_draft import CarriedLoad, LogFacts, draft_study
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.wiring.assignment import DEGREE
-from study_files import recording
-from synthetic import arm
+from study_files import csv_text, recording
+from synthetic import ARM, arm
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +46,13 @@ def test_the_draft_tells_what_the_study_by_hand_does(logs: Path) -> None:
     np.testing.assert_allclose(drafted.drives.gains, by_hand.drives.gains, rtol=2e-3)
 
 
-@pytest.mark.slow
-def test_files_carry_the_loads_that_are_said(logs: Path) -> None:
-    files = [logs / f"{log.name}.csv" for log in ampere_logs.LOGS]
+def test_files_carry_the_loads_that_are_said(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    files = [tmp_path / f"{log.name}.csv" for log in ampere_logs.LOGS]
+    for seed, file in enumerate(files):
+        file.write_text(csv_text(seed))
     facts = LogFacts(loads=(CarriedLoad(pattern="run_test*"), CarriedLoad(pattern="*load_1.csv")))
-    draft = draft_study(logs / "arm.urdf", files, facts=facts)
+    draft = draft_study(tmp_path / "arm.urdf", files, facts=facts)
     # One with each load is fitted, although its name says that it judges.
     assert [(one.load, one.use) for one in draft.recordings] == [
         ("", "train"),
@@ -58,7 +60,7 @@ def test_files_carry_the_loads_that_are_said(logs: Path) -> None:
         ("load1", "train"),
     ]
     assert draft.loads == {"load1": None, "load2": None}
-    assert "[loads.load1]" in draft.text(logs)
+    assert "[loads.load1]" in draft.text(tmp_path)
 
 
 POSITIONS, CURRENTS = slice(7, 13), slice(19, 25)

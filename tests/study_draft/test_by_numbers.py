@@ -117,8 +117,8 @@ MIXED = np.array([[80.0, 0.0], [-31.0, -100.0]])
 
 def tool(q: np.ndarray) -> np.ndarray:
     """Where a point of the last link is, m: of six coordinates those that the plane arm moves."""
-    R, p = zip(*(poses(arm(), one) for one in q), strict=True)
-    point = np.array([r[-1] @ [0.1, 0.02, 0.3] + o[-1] for r, o in zip(R, p, strict=True)])
+    R, p = poses(arm(), q)
+    point = R[:, -1] @ [0.1, 0.02, 0.3] + p[:, -1]
     return point[:, np.ptp(point, axis=0) > 1e-6]
 
 

@@ -29,14 +29,10 @@ class Places:
     def __init__(self, robot: Robot, q: np.ndarray) -> None:
         self._rows = np.linspace(0, len(q) - 1, min(len(q), _ROWS)).astype(int)
         some, tip = q[self._rows], robot.tip
-        every = [poses(robot, one) for one in some]
+        R, p = poses(robot, some)
+        turned = R[:, tip].reshape(len(some), 9)
         # Whatever the base, the tool, and the units: each column is a sum of these.
-        self._known = np.stack(
-            [
-                np.concatenate([[1.0], one, R[tip].ravel(), p[tip]])
-                for one, (R, p) in zip(some, every, strict=True)
-            ]
-        )
+        self._known = np.column_stack([np.ones(len(some)), some, turned, p[:, tip]])
 
     def tell(self, columns: np.ndarray) -> bool:
         """Whether as many of them follow from the positions as do of a tool, or all that move.

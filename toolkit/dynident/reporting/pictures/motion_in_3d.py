@@ -183,7 +183,7 @@ def _with_ellipsoids(viewer: Any, robot: Robot, t: np.ndarray, q: np.ndarray) ->
 def _look_at(viewer: Any, robot: Robot, q: np.ndarray) -> None:
     """Have everything in view that the joints pass."""
     some = q[:: max(len(q) // 50, 1)]
-    points = np.concatenate([np.zeros((1, 3)), *(poses(robot, one)[1] for one in some)])
+    points = np.concatenate([np.zeros((1, 3)), poses(robot, some)[1].reshape(-1, 3)])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     reach = max(float(np.linalg.norm(np.ptp(points, axis=0))), 0.3)
     viewer.SetCameraPose(middle + reach * np.array([0.9, -0.9, 0.5]), middle)
