@@ -41,19 +41,11 @@ def test_twenty_impossible_estimates_of_seven_links(consistency, spread, flat, d
 @pytest.mark.parametrize("distance", ["quadratic", "entropic"])
 @pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
 def test_the_nonlinear_program_reaches_the_bound(consistency, spread, flat, distance) -> None:
-    """Of three estimates of seven links, and of seventeen of four, which take half the time.
-
-    Of the last of seven links one start alone ends at the limit of iterations.
-    """
-    tried = 0
     for seed in range(20):
-        links = 4 if seed % 7 else 7
-        case = chain_case(links, seed, Within(consistency), distance, spread=spread)
+        case = chain_case(7, seed, Within(consistency), distance, spread=spread)
         answer = solve(case.problem, "nlp")
         assert answer.certificate.gap <= OPTIMAL, seed
-        # Of an estimate that is possible there is nothing to solve.
-        tried += bool(answer.certificate.starts)
-    assert tried >= 16, "the starts tried are told"
+        assert answer.certificate.starts, "the starts tried are told"
 
 
 @pytest.mark.parametrize("links", [10, pytest.param(30, marks=pytest.mark.slow)])
