@@ -21,5 +21,5 @@ def test_an_effect_is_had_by_its_label_as_it_is_in_the_model() -> None:
 def test_what_is_not_in_a_model_is_neither_had_nor_taken_out() -> None:
     model = Model(arm()) + "viscous_friction@elbow"
     for asked in (model.effect, model.__sub__):
-        with pytest.raises(EffectError, match="shoulder.*is not in the model"):
+        with pytest.raises(EffectError, match=r"shoulder.*is not in the model"):
             asked("viscous_friction@shoulder")
