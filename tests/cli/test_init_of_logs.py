@@ -69,7 +69,8 @@ def test_four_joints_in_bags_are_explained_as_by_hand(run, tmp_path: Path) -> No
     first, *others = drafts.values()
     for other in others:
         assert_same_study(first, other)
-        assert first.train.recordings[0].t[0] == other.train.recordings[0].t[0]
+        for mine, theirs in ((first.train, other.train), (first.test, other.test)):
+            assert mine.recordings[0].t[0] == theirs.recordings[0].t[0]
     for number, one in enumerate(recordings):
         write(one, tmp_path / f"run_{number}.csv")
     (tmp_path / "hand.toml").write_text(

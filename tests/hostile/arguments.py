@@ -91,10 +91,7 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
         ("explain", "study.toml", "--most", "9" * 5000),
         r"Invalid value for '--most': '9+\.\.\.9",
     ),
-    "harmonics in Arabic digits": (
-        ("design", "study.toml", "--starts", "1", "--harmonics", "\u0662"),
-        ANSWER,
-    ),
+    "effects in Arabic digits": (("diagnose", "study.toml", "--most", "\u0660"), ANSWER),
     "a method that nobody has": (
         ("fit", "study.toml", "--method", "magic"),
         "Invalid value for '--method': 'magic' is not one of 'least-squares', 'iv",

@@ -202,8 +202,8 @@ OTHERS: dict[str, tuple[Content, str]] = {
         damaged("parameters", [{}] * 20_000),
         r"fit\.json: is not a dynident estimate",
     ),
-    "a covariance of a hundred thousand": (
-        damaged("covariance", [[0.0] * 320] * 320),
+    "a covariance of a million": (
+        damaged("covariance", [[0.0] * 1000] * 1000),
         r"fit\.json: is not a dynident estimate",
     ),
     "a covariance that is not positive": (

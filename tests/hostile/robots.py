@@ -353,9 +353,9 @@ CHECKED: dict[str, tuple[str, Content, str]] = {
         chain(20_000),
         r"a\.urdf: has 20000 links, and 4096 is the limit",
     ),
-    "a star of 1000 links": (
+    "a star of 2000 links": (
         "a.urdf",
-        chain(1000).replace('<parent link="l', '<parent link="l0" was="l'),
+        chain(2000).replace('<parent link="l', '<parent link="l0" was="l'),
         ANSWER,
     ),
     # Meshes

@@ -240,8 +240,8 @@ OTHERS: dict[str, tuple[Content, str]] = {
         "filter = 3\n" + STUDY + "[filter]\n",
         r"study\.toml: is not TOML: Cannot overwrite a value",
     ),
-    "20 000 unknown keys": (
-        "".join(f"k{k} = 1\n" for k in range(20_000)) + STUDY,
+    "100 000 unknown keys": (
+        "".join(f"k{k} = 1\n" for k in range(100_000)) + STUDY,
         r"study\.toml: unknown key 'k0'",
     ),
     "10 000 recordings of one file": (

@@ -163,7 +163,7 @@ def test_the_bias_is_that_of_many_recordings_and_intervals_hold_it(
         errors.append(plain.values - truth)
         said.append(bias.values)
         without.append(np.abs(plain.values - truth) < 1.96 * bias.sigma)
-        found = LeastSquares().fit(model, data)
+        found = fit(model, data)
         inside.append(np.abs(found.values - truth) < 1.96 * found.sigma)
     at = [model.names.index(name) for name in names]
     bias = np.mean(said, axis=0)[at]

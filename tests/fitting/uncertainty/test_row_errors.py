@@ -27,14 +27,6 @@ def covered(estimates: list[di.fitting.Estimate], truth: np.ndarray) -> float:
     return float(np.mean(inside))
 
 
-def by_rows(model: Model, data: Dataset) -> di.fitting.Estimate:
-    """The fit's estimate before what has tests of its own: reversals, widths and input noise.
-
-    Encoders have no noise here and the width is the true one: the last two change nothing.
-    """
-    return LeastSquares().without_bias(model, data)[0]
-
-
 def drawn(model: Model, clean: Recording, settings: Filter | None, seed: int) -> Dataset:
     noise = np.array(STD) * np.random.default_rng(seed).normal(size=clean.tau.shape)
     return Dataset((clean.replace(tau=clean.tau + noise),), settings)
@@ -115,19 +107,19 @@ def test_scaling_torques_scales_sigma(model: Model) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("there", "fitted"),
+    "there",
     [
-        (lab.Lab(torque_std=STD, seconds=5.0), fit),
-        (lab.Lab(torque_std=STD, colour_s=0.05, rate_hz=500.0), by_rows),
+        lab.Lab(torque_std=STD, seconds=5.0),
+        lab.Lab(torque_std=STD, colour_s=0.05, rate_hz=500.0),
     ],
     ids=["short records", "slow noise"],
 )
 def test_intervals_cover_where_the_noise_of_the_motions_band_is_hard_to_know(
-    there: lab.Lab, fitted
+    there: lab.Lab,
 ) -> None:
     """Of 100 recordings of a foreign simulator; with even bands the slow noise has 0.86."""
     model = lab.model()
-    found = [fitted(model, Dataset((one,))) for one in there.recordings(range(7200, 7300))]
+    found = [fit(model, one) for one in there.recordings(range(7200, 7300))]
     assert 0.93 <= covered(found, lab.truth(model)) <= 0.97
 
 
@@ -137,20 +129,12 @@ def hundred() -> list[Recording]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("settings", "fitted"),
-    [(None, fit), (Filter(), by_rows)],
-    ids=["default filter", "no filter"],
-)
-def test_intervals_cover_what_they_say(hundred, settings: Filter | None, fitted) -> None:
-    """Of 100 recordings of a foreign simulator; rows taken as independent: 0.87 and 0.86.
-
-    Behind a filter rows around some reversals do not count, without one all do: there the whole
-    fit's estimate is that of its rows to the last digit.
-    """
+@pytest.mark.parametrize("settings", [None, Filter()], ids=["default filter", "no filter"])
+def test_intervals_cover_what_they_say(hundred, settings: Filter | None) -> None:
+    """Of 100 recordings of a foreign simulator; rows taken as independent: 0.87 and 0.86."""
     model = lab.model()
     data = [Dataset((one,), settings) for one in hundred]
-    found = [fitted(model, one) for one in data]
+    found = [fit(model, one) for one in data]
     assert 0.93 <= covered(found, lab.truth(model)) <= 0.97
     independent = LeastSquares(errors="independent")
     assert covered([independent.fit(model, one) for one in data], lab.truth(model)) < 0.91
