@@ -45,6 +45,18 @@ def test_values_that_jump_to_and_fro_by_a_little_are_not() -> None:
     assert 6 <= rounds_of(jumping) <= 15
 
 
+def test_values_that_jump_by_much_are_not_followed_either() -> None:
+    """As the angle of a tilt does that no row tells."""
+    rng = np.random.default_rng(0)
+    given = Model(arm()).given_values()
+    assert 6 <= rounds_of(lambda at: given * rng.uniform(0.1, 10.0)) <= 20
+
+
+def test_values_far_away_that_come_nearer_slowly_are_followed() -> None:
+    end = 10.0 * Model(arm()).given_values()
+    assert rounds_of(lambda at: end + 0.95 * (at - end)) == ROUNDS
+
+
 def test_values_far_from_their_end_do_not_stall() -> None:
     """They swing by a tenth, and shorter steps bring them together."""
     end = 1.1 * Model(arm()).given_values()

@@ -19,7 +19,6 @@ from dynident.fitting.reversals.standing_joints import (
     few_enough,
     near_stops,
     resting,
-    rests_throughout,
     standing_note,
     stands,
     without_stops,
@@ -178,9 +177,9 @@ def test_what_creeps_within_the_noise_of_its_speed_does_not_rest() -> None:
         assert few_enough(near, rest, DEFAULTS.sticking)[0] == (std < 1e-4)
         np.testing.assert_array_equal(rest[sampled.t < 3.5, 1], True)
         assert not rest[(sampled.t > 4.3) & (sampled.t < 7.7), 1].any()
-        assert not rests_throughout(sampled).any()
+        assert not JointSpeeds(sampled).rests.any()
         still = sample(one.replace(q=0.3 + std * noise), None)
-        assert rests_throughout(still).all() and resting(still).all()
+        assert JointSpeeds(still).rests.all() and resting(still).all()
 
 
 def test_a_comparison_counts_the_rows_that_a_fit_counts() -> None:

@@ -10,9 +10,9 @@ _SHRUNK = 0.9
 """Share of the change before which a change has to stay below, or the next step is shorter."""
 _SHORTEST = 0.1
 _NEAR = 1e-2
-"""Relative change of the values below which they may stall."""
+"""Relative change of the values below which they are near their end."""
 _PATIENCE = 5
-"""Repetitions after which a change is to be the smaller half of what it was before them."""
+"""Repetitions after which the change is to be smaller; near the end, half of what it was."""
 
 
 class FixedPoint:
@@ -27,13 +27,14 @@ class FixedPoint:
 
     @property
     def stalls(self) -> bool:
-        """Whether values near their end no longer come nearer.
+        """Whether values no longer come nearer to their end.
 
         Columns that change by steps with the values, as those of a gap whose link knocks, let them
-        jump to and fro by a little for ever.
+        jump to and fro by a little for ever; angles that hardly any row tells, from turn to turn.
         """
         before, last = self._relative[:-_PATIENCE], self._relative[-_PATIENCE:]
-        return bool(before) and min(last) < _NEAR and min(last) > 0.5 * min(before)
+        needed = 0.5 if min(last, default=np.inf) < _NEAR else 1.0
+        return bool(before) and min(last) > needed * min(before)
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the values at which the columns are taken next.

@@ -28,13 +28,16 @@ pin: Any = LateModule("pinocchio")
 
 # Samples of one call for which a function of many samples pays. Measured: making it takes as long
 # as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once for all calls, and
-# whoever asks for a recording asks again; below, a plain fit is done before CasADi is loaded. Not
-# by what was asked before: the last digits would be.
-_MANY = 2500
+# whoever asks for a recording asks again and again; below, a plain fit is done before CasADi is
+# loaded. Not by what was asked before: the last digits would be.
+_MANY = 1000
 # Joints up to which derivatives by one joint's motion are written out. Measured: for 2, 7 and 12 of
 # them that takes 0.1, 0.05 and 0.1 s a joint, and a sample 0.2, 1.3 and 3 us where Pinocchio, which
 # knows only those by all joints, takes 4, 12 and 45.
 _FEW_JOINTS = 12
+# The same of those by all joints, which are these of each: for 2, 3 and 4 joints making them takes
+# as long as 5 000, 14 000 and 32 000 samples through Pinocchio.
+_FEWEST_JOINTS = 3
 
 
 def _kinematics(joints: Sequence[Joint], gravity: Array) -> tuple[Any, list[int]]:
@@ -252,6 +255,9 @@ class Dynamics:
         theta : (10 n,) ndarray
             As in `Robot.torque_derivatives`.
         """
+        if self._is_many(q) and self.n <= _FEWEST_JOINTS:
+            each = [self._by_joint(joint, q, v, a, theta) for joint in range(self.n)]
+            return TorqueDerivatives(*np.stack(each, axis=-1).swapaxes(0, 1))
         space = self._workspace()
         space.hold(theta.reshape(self.n, 10))
         found = self._evaluate(space, pin.computeRNEADerivatives, (q, v, a), (3, self.n, self.n))
@@ -278,9 +284,12 @@ class Dynamics:
         """
         if not self._is_many(q) or self.n > _FEW_JOINTS:
             return None
-        kernel = torque_derivative_kernel(self.tree, joint)
-        found = kernel(q, v, a, parameters=theta.tolist())
+        found = self._by_joint(joint, q, v, a, theta)
         return TorqueDerivatives(found[:, 0], found[:, 1], found[:, 2])
+
+    def _by_joint(self, joint: int, q: Array, v: Array, a: Array, theta: Array) -> Array:
+        """Return the derivatives by one joint's q, v and a, (T, 3, n)."""
+        return torque_derivative_kernel(self.tree, joint)(q, v, a, parameters=theta.tolist())
 
     def _is_many(self, q: Array) -> bool:
         """Whether a function of many samples pays."""

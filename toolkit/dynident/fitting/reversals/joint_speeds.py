@@ -15,6 +15,12 @@ from dynident.recording import MotionInParts
 from dynident.recording.position_cutoff import DIGITS, SpeedGain
 from dynident.recording.white_noise import encoder_noise_std
 
+REST_S = 0.2
+"""Duration of a stop from which it is a rest, s."""
+_SCATTER = 10.0
+"""Range of the positions of a joint that rests, over the noise of its encoder."""
+_SLIPS = 1e-3
+"""Share of its travel that a joint which rests may slip in a second."""
 _RINGING = 0.1
 """Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
 constant 1 / (2 pi cut-off)."""
@@ -44,6 +50,11 @@ class JointSpeeds:
         q = self.sampled.recording.q
         digits = DIGITS * np.abs(q).max(axis=0)
         return np.maximum(encoder_noise_std(q), digits) * self._gain.noise
+
+    @cached_property
+    def rests(self) -> np.ndarray:
+        """Which joints rest from the first row to the last, (n,) mask."""
+        return np.ptp(self.sampled.q, axis=0) <= rest_range(self.sampled)
 
     @cached_property
     def rms(self) -> np.ndarray:
@@ -141,3 +152,17 @@ class JointSpeeds:
         if few and isinstance(source, MotionInParts):
             return source.speeds[raw]
         return source.part(raw).v
+
+
+def rest_range(sampled: Sampled) -> np.ndarray:
+    """Return the range of positions within which a joint rests, (n,) rad or m.
+
+    What encoders make of one position, or little of the travel.
+
+    Parameters
+    ----------
+    sampled : the recording.
+    """
+    q = sampled.recording.q
+    least = DIGITS * np.abs(q).max(axis=0) + _SCATTER * encoder_noise_std(q)
+    return np.maximum(least, _SLIPS * REST_S * np.ptp(q, axis=0))

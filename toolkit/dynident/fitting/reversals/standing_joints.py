@@ -14,21 +14,12 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from dynident.criteria import DEFAULTS, StickingCriteria
-from dynident.fitting.reversals.joint_speeds import JointSpeeds
+from dynident.fitting.reversals.joint_speeds import REST_S, JointSpeeds, rest_range
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
 from dynident.formulas import quoted_joint
 from dynident.model import Model, dry_joints
 from dynident.recording import Dataset, Filter, Recording, uniform
-from dynident.recording.position_cutoff import DIGITS
-from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import listed, number, percent
-
-_REST = 0.2
-"""Duration of a stop from which it is a rest, s."""
-_SCATTER = 10.0
-"""Range of the positions of a joint that rests, over the noise of its encoder."""
-_SLIPS = 1e-3
-"""Share of its travel that a joint which rests may slip in a second."""
 
 
 def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
@@ -47,7 +38,7 @@ def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
     for speeds in every:
         limits = criteria.noise * speeds.noise + speeds.ringing
         each = _stops(speeds.used(), limits)
-        rests = rests | rests_throughout(speeds.sampled)
+        rests = rests | speeds.rests
         count += np.array([len(stops) for stops in each])
         longer += np.array(
             [
@@ -92,30 +83,13 @@ def resting(sampled: Sampled) -> np.ndarray:
     ----------
     sampled : the recording.
     """
-    q, window = sampled.q, max(int(_REST * sampled.rate_hz), 1)
+    q, window = sampled.q, max(int(REST_S * sampled.rate_hz), 1)
     if len(q) < window:
-        return np.tile(np.ptp(q, axis=0) <= _stays_within(sampled), (len(q), 1))
+        return np.tile(JointSpeeds(sampled).rests, (len(q), 1))
     highest = maximum_filter1d(q, window, axis=0, mode="nearest")
     travel = highest - minimum_filter1d(q, window, axis=0, mode="nearest")
-    still = (travel <= _stays_within(sampled)).astype(np.uint8)
+    still = (travel <= rest_range(sampled)).astype(np.uint8)
     return maximum_filter1d(still, window, axis=0, mode="nearest").astype(bool)
-
-
-def rests_throughout(sampled: Sampled) -> np.ndarray:
-    """Return which joints rest from the first row of a recording to the last, (n,) mask.
-
-    Parameters
-    ----------
-    sampled : the recording.
-    """
-    return np.ptp(sampled.q, axis=0) <= _stays_within(sampled)
-
-
-def _stays_within(sampled: Sampled) -> np.ndarray:
-    """Range of positions that encoders make of one, or little of the travel, (n,) rad or m."""
-    q = sampled.recording.q
-    least = DIGITS * np.abs(q).max(axis=0) + _SCATTER * encoder_noise_std(q)
-    return np.maximum(least, _SLIPS * _REST * np.ptp(q, axis=0))
 
 
 def few_enough(near: np.ndarray, rest: np.ndarray, criteria: StickingCriteria) -> np.ndarray:
@@ -265,9 +239,9 @@ def too_wide_note(model: Model, dataset: Dataset) -> str:
     standing, criteria = standing_in(dataset), DEFAULTS.sticking
     if not standing:
         return ""
-    every = _speeds(dataset.recordings, dataset.filter)
+    every = list(_speeds(dataset.recordings, dataset.filter))
     speed = np.max([_unknown_within(one, criteria) for one in every], axis=0)
-    rest = np.all([rests_throughout(sample(r, dataset.filter)) for r in dataset.recordings], axis=0)
+    rest = np.all([one.rests for one in every], axis=0)
     widths = dict(zip(model.robot.names, map(float, model.friction_widths), strict=True))
     narrower = {
         joint: float(number(one / criteria.noise, 1))
