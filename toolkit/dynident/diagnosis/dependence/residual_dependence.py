@@ -23,7 +23,7 @@ from dynident.diagnosis.dependence.residual_record import ResidualRecord
 from dynident.evidence.held_out import HeldOut
 from dynident.tables import Table, listed, percent
 
-ROWS = 750
+ROWS = 600
 """Rows of a joint in its regressions, at most: time grows with their cube."""
 FEWEST_ROWS = 150
 """Rows below which nothing is said."""

@@ -110,13 +110,16 @@ def _is_rounding(evidence: Evidence, run: Run, residual: np.ndarray, joint: int)
 
 def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[DisturbancePulse, ...]:
     """Find pulses in residuals of any joints and recordings; the most significant first."""
-    left, found = list(data), []
+    by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
+    places = {joint: _place(series, criteria) for joint, series in by_joint.items()}
+    found: list[DisturbancePulse] = []
     while len(found) < criteria.contacts.most:
-        best = _best(left, criteria)
+        best = _best([one for one in places.values() if one is not None], criteria.contacts)
         if best is None:
             break
         found.append(best)
-        left = [_cleared(one, best) for one in left]
+        by_joint[best.joint] = [_cleared(one, best) for one in by_joint[best.joint]]
+        places[best.joint] = _place(by_joint[best.joint], criteria)
     return tuple(sorted(found, key=lambda pulse: pulse.p_value))
 
 
@@ -149,25 +152,32 @@ def without(run: Run, pulses: Sequence[DisturbancePulse], criteria: ContactCrite
 # --- one search ---------------------------------------------------------------------------------
 
 
-def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | None:
-    """The most significant pulse; None where none is."""
-    by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
-    found, positions = [], 0
-    for series in by_joint.values():
-        nothing = [np.zeros(s.t.shape[1], dtype=bool) for s in series]
-        places = _places(changes_of(series, nothing, criteria), criteria.contacts)
-        if not places:
-            continue
-        peak = min(places)
-        positions += sum(place.tried for place in places)
-        found.append(_looked_at(peak, series, criteria))
-    if not found:
+def _best(
+    places: Sequence[tuple[_PulsePlace, int]], criteria: ContactCriteria
+) -> DisturbancePulse | None:
+    """The most significant pulse; None where none is.
+
+    Parameters
+    ----------
+    places : of each joint, with how many were tried there.
+    criteria : what is significant.
+    """
+    if not places:
         return None
-    best = min(found)
-    p_value = min(1.0, best.chance * positions)
-    if p_value >= criteria.contacts.level:
+    best = min(place for place, _ in places)
+    p_value = min(1.0, best.chance * sum(tried for _, tried in places))
+    if p_value >= criteria.level:
         return None
-    return _refined(best, p_value, criteria.contacts)
+    return _refined(best, p_value, criteria)
+
+
+def _place(series: Sequence[Repeated], criteria: Criteria) -> tuple[_PulsePlace, int] | None:
+    """Where a pulse stands out most at a joint, and how many places were tried; None for none."""
+    nothing = [np.zeros(s.t.shape[1], dtype=bool) for s in series]
+    places = _places(changes_of(series, nothing, criteria), criteria.contacts)
+    if not places:
+        return None
+    return _looked_at(min(places), series, criteria), sum(place.tried for place in places)
 
 
 def _looked_at(peak: _PulsePlace, series: Sequence[Repeated], criteria: Criteria) -> _PulsePlace:
