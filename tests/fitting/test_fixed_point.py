@@ -58,6 +58,18 @@ def test_values_far_away_that_come_nearer_slowly_are_followed() -> None:
 
 
 def test_values_far_from_their_end_do_not_stall() -> None:
-    """They swing by a tenth, and shorter steps bring them together."""
+    """They swing ever wider, and shorter steps bring them together."""
     end = 1.1 * Model(arm()).given_values()
     assert rounds_of(lambda at: end - 1.2 * (at - end)) < ROUNDS
+
+
+def test_values_that_grow_first_are_followed_to_their_end() -> None:
+    given = Model(arm()).given_values()
+    end, last = 10.0 * given, []
+
+    def found(at: np.ndarray) -> np.ndarray:
+        last.append(float(np.linalg.norm(at - end) / np.linalg.norm(end)))
+        return end - 9.0 * (at - end)
+
+    assert rounds_of(found, 1e-3) > 10
+    assert max(last) > 5.0 and last[-1] < 1e-3

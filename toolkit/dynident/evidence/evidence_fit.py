@@ -187,10 +187,10 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
     reliable = evidence.criteria.noise.reliable
-    columns, values, small, fixed_point = [], at, False, FixedPoint()
+    columns, values, settled, fixed_point = [], at, True, FixedPoint()
     white = None if near is None else near.white
     for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
-        if not columns or (model.needs_values and not small):
+        if not columns or model.needs_values:
             model = model.at(at)
             columns = [
                 [joint_columns(evidence, model, r, j, at) for j in range(n)]
@@ -209,12 +209,12 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             for j in range(n)
         )
         change = float(np.linalg.norm(_held(model, values) - at))
-        small = bool(change <= criteria.value_tolerance * np.linalg.norm(values))
+        small = change <= criteria.value_tolerance * np.linalg.norm(values)
+        settled = bool(small) or not model.needs_values
         enough = round >= criteria.noise_rounds - (near is not None)
         if enough and (small or fixed_point.stalls):
             break
-        if not small:
-            at = _held(model, fixed_point.following(model, at, values))
+        at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values, white)
     summed = _moments(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)
@@ -236,7 +236,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
         torque_peaks=friction_reach(evidence, values),
-        settled=small or not model.needs_values,
+        settled=settled,
     )
 
 

@@ -12,7 +12,8 @@ _SHORTEST = 0.1
 _NEAR = 1e-2
 """Relative change of the values below which they are near their end."""
 _PATIENCE = 5
-"""Repetitions after which the change is to be smaller; near the end, half of what it was."""
+"""Repetitions after which the change is to be smaller than in as many before; near the end, half
+of what it was."""
 
 
 class FixedPoint:
@@ -33,8 +34,12 @@ class FixedPoint:
         jump to and fro by a little for ever; angles that hardly any row tells, from turn to turn.
         """
         before, last = self._relative[:-_PATIENCE], self._relative[-_PATIENCE:]
-        needed = 0.5 if min(last, default=np.inf) < _NEAR else 1.0
-        return bool(before) and min(last) > needed * min(before)
+        if not before:
+            return False
+        if min(last) < _NEAR:
+            return min(last) > 0.5 * min(before)
+        # Far from there it may grow first, until the steps are short enough.
+        return len(before) >= _PATIENCE and min(last) > min(before[-_PATIENCE:])
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the values at which the columns are taken next.

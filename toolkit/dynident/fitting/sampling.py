@@ -37,7 +37,7 @@ _MEMORY = 2**27
 No bound: a block is never shorter than twice the filter's overlap, which grows with the sampling
 rate over the cut-off, and has an overlap on either side besides.
 """
-_LEAST_BLOCK = 2048  # fewer do not pay for a function of many samples
+_LEAST_BLOCK = 2048  # of many fewer each has a larger part of what a block costs
 
 LEAST_ROWS = 20
 """Rows below which a recording says too little."""

@@ -27,9 +27,9 @@ from dynident.robot.tree import Array, Joint
 pin: Any = LateModule("pinocchio")
 
 # Samples of one call for which a function of many samples pays. Measured: making it takes as long
-# as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once for all calls, and
-# whoever asks for a recording asks again and again; below, a plain fit is done before CasADi is
-# loaded. Not by what was asked before: the last digits would be.
+# as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once a robot, and whoever
+# asks for a recording asks again and again; below, a plain fit is done before CasADi is loaded. Not
+# by what was asked before: the last digits would be.
 _MANY = 1000
 # Joints up to which derivatives by one joint's motion are written out. Measured: for 2, 7 and 12 of
 # them that takes 0.1, 0.05 and 0.1 s a joint, and a sample 0.2, 1.3 and 3 us where Pinocchio, which

@@ -85,7 +85,7 @@ def resting(sampled: Sampled) -> np.ndarray:
     """
     q, window = sampled.q, max(int(REST_S * sampled.rate_hz), 1)
     if len(q) < window:
-        return np.tile(JointSpeeds(sampled).rests, (len(q), 1))
+        return np.tile(np.ptp(q, axis=0) <= rest_range(sampled), (len(q), 1))
     highest = maximum_filter1d(q, window, axis=0, mode="nearest")
     travel = highest - minimum_filter1d(q, window, axis=0, mode="nearest")
     still = (travel <= rest_range(sampled)).astype(np.uint8)
@@ -239,9 +239,10 @@ def too_wide_note(model: Model, dataset: Dataset) -> str:
     standing, criteria = standing_in(dataset), DEFAULTS.sticking
     if not standing:
         return ""
-    every = list(_speeds(dataset.recordings, dataset.filter))
-    speed = np.max([_unknown_within(one, criteria) for one in every], axis=0)
-    rest = np.all([one.rests for one in every], axis=0)
+    every = _speeds(dataset.recordings, dataset.filter)
+    each = [(_unknown_within(one, criteria), one.rests) for one in every]
+    speed = np.max([slow for slow, _ in each], axis=0)
+    rest = np.all([rests for _, rests in each], axis=0)
     widths = dict(zip(model.robot.names, map(float, model.friction_widths), strict=True))
     narrower = {
         joint: float(number(one / criteria.noise, 1))

@@ -31,7 +31,7 @@ _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` 
 _MEMORY = 13 * 2**19
 """Bytes that the columns of a motion in a block are meant to take; of four motions they are held at
 a time."""
-_LEAST_BLOCK = 2560  # samples; fewer than 2500 go through Pinocchio one by one
+_LEAST_BLOCK = 2560  # samples; of many fewer each has a larger part of what a block costs
 _FINEST = 1e-7
 """Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
 without noise is less."""
