@@ -42,6 +42,8 @@ def test_derivatives_by_all_joints_are_those_of_few_samples(seed) -> None:
     motion = robot.random_motion(seed, dynamics._MANY)
     found = robot.torque_derivatives(*motion)
     wanted = robot.torque_derivatives(*(x[:30] for x in motion))
+    # Where joints only slide, those by speeds are rounding errors of the others.
+    size = max(np.abs(x).max() for x in (wanted.by_q, wanted.by_v, wanted.by_a))
     for name in ("by_q", "by_v", "by_a"):
         few = getattr(wanted, name)
-        np.testing.assert_allclose(getattr(found, name)[:30], few, atol=1e-13 * np.abs(few).max())
+        np.testing.assert_allclose(getattr(found, name)[:30], few, rtol=1e-12, atol=1e-14 * size)
