@@ -13,7 +13,7 @@ settings.load_profile("without deadlines")
 
 
 # Searches for cycles took a fifteenth of the suite: they go through all modules that are loaded.
-gc.set_threshold(20_000, *gc.get_threshold()[1:])
+gc.set_threshold(200_000, *gc.get_threshold()[1:])
 
 
 def pytest_collection_finish() -> None:
