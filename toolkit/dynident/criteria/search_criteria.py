@@ -328,7 +328,7 @@ class GlobalSearchCriteria(CriteriaGroup):
     population: int = criterion(
         20,
         "shapes",
-        "shapes of a generation, per unknown",
+        "shapes of a generation, per unknown; together as many as the next power of two",
         "measured: 41 of 42 searches of seven gaps find them; with 12 in place of 20 there are 35",
         least=2,
     )

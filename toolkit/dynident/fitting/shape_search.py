@@ -239,7 +239,8 @@ class Evolution:
 
     Attributes
     ----------
-    population : trials of a generation, per unknown.
+    population : trials of a generation, per unknown; as Sobol points, of which there are powers of
+        two, no fewer than that.
     generations : at most.
     enough : loss below which it ends.
     hope : loss that must be reached within `patience` generations.
