@@ -373,7 +373,8 @@ class GlobalSearchCriteria(CriteriaGroup):
     patience: int = criterion(
         5,
         "generations",
-        "generations after which a search that explains nothing ends",
+        "generations within which a search must explain `least`, twice of it within twice as many, "
+        "and so on, or it ends",
         "measured: 22 searches of 18 gaps ended above 0.4; each had explained 0.52 by then",
         least=1,
     )

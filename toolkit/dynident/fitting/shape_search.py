@@ -243,7 +243,8 @@ class Evolution:
         two, no fewer than that.
     generations : at most.
     enough : loss below which it ends.
-    hope : loss that must be reached within `patience` generations.
+    hope : loss that must be reached within `patience` generations, twice of it within twice as
+        many, and so on.
     finalists : number of the best trials that are kept.
     """
 
@@ -262,7 +263,8 @@ class Evolution:
             nonlocal count
             count += 1
             best = log.best[0].loss if log.best else 0.0
-            return (count >= self.patience and best > self.hope) or best < self.enough
+            hopeless = count >= self.patience and best > self.hope * count / self.patience
+            return hopeless or best < self.enough
 
         return differential_evolution(
             lambda points: np.array([one.loss for one in log.many(points.T)]),
