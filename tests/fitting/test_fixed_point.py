@@ -63,6 +63,15 @@ def test_values_far_from_their_end_do_not_stall() -> None:
     assert rounds_of(lambda at: end - 1.2 * (at - end)) < ROUNDS
 
 
+def test_values_that_hardly_move_at_first_are_followed_to_their_end() -> None:
+    """As a tilt of milliradians beside heavy bodies, whose angle is fitted in a later round."""
+    model, fixed_point = Model(arm()), FixedPoint()
+    given = model.given_values()
+    for size in (0.0026, *(0.0102 * 0.75**k for k in range(12))):
+        assert not fixed_point.stalls
+        fixed_point.following(model, given, (1.0 + size) * given)
+
+
 def test_values_that_grow_first_are_followed_to_their_end() -> None:
     given = Model(arm()).given_values()
     end, last = 10.0 * given, []

@@ -136,7 +136,7 @@ def test_the_global_search_ends_when_enough_is_found_or_nothing_is_to_be_hoped_f
     # There is more than that, reached within three generations, and not twice as much.
     weak = search(peak(), Evolution(population=24, generations=40, hope=-0.6, patience=3))
     assert hopeless.evaluations < weak.evaluations < every
-    assert -1.2 < weak.best[0].loss < -0.6
+    assert weak.best[0].loss < -0.6
 
 
 def test_the_grid_is_screened_in_all_combinations_or_group_by_group() -> None:

@@ -375,7 +375,8 @@ class GlobalSearchCriteria(CriteriaGroup):
         "generations",
         "generations within which a search must explain `least`, twice of it within twice as many, "
         "and so on, or it ends",
-        "measured: 22 searches of 18 gaps ended above 0.4; each had explained 0.52 by then",
+        "measured: 22 searches of 18 gaps ended above 0.4, and each had explained 0.52 by then; "
+        "with 9 in its place, and no more asked later, all 18 answers were the same",
         least=1,
     )
 

@@ -33,13 +33,11 @@ class FixedPoint:
         Columns that change by steps with the values, as those of a gap whose link knocks, let them
         jump to and fro by a little for ever; angles that hardly any row tells, from turn to turn.
         """
-        before, last = self._relative[:-_PATIENCE], self._relative[-_PATIENCE:]
-        if not before:
+        before, last = self._relative[:-_PATIENCE][-_PATIENCE:], self._relative[-_PATIENCE:]
+        # It may grow first, until the steps are short enough.
+        if len(before) < _PATIENCE:
             return False
-        if min(last) < _NEAR:
-            return min(last) > 0.5 * min(before)
-        # Far from there it may grow first, until the steps are short enough.
-        return len(before) >= _PATIENCE and min(last) > min(before[-_PATIENCE:])
+        return min(last) > (0.5 if min(last) < _NEAR else 1.0) * min(before)
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the values at which the columns are taken next.

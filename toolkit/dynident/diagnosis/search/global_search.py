@@ -20,6 +20,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from dynident.criteria import GlobalSearchCriteria
 from dynident.diagnosis.dependence.bursts import beyond_reversals, bursts_in
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
@@ -305,8 +306,14 @@ def _shapes_on(
     evidence: Evidence, fitted: EvidenceFit, effect: Effect
 ) -> ShapeSolution[ScoreTrial]:
     """Search all shapes of an effect, and the values at which its column is taken."""
-    bounds = np.log(effect.sought_in(fitted.model.robot))
-    return _shapes_within(evidence, fitted, effect, bounds, evidence.criteria.global_search.enough)
+    bounds, systematic = np.log(effect.sought_in(fitted.model.robot)), fitted.error_signal
+    criteria = evidence.criteria.global_search
+    solver = replace(
+        _evolution(criteria),
+        enough=-criteria.enough * systematic,
+        hope=-criteria.least * systematic,
+    )
+    return _shapes_within(evidence, fitted, effect, bounds, solver)
 
 
 def _shapes_about(
@@ -319,16 +326,24 @@ def _shapes_about(
     # A fit may have led beyond what is sought.
     ends = np.maximum(at - reach, low), np.minimum(at + reach, np.maximum(at, high))
     about = np.stack(ends, axis=1)
-    return _shapes_within(evidence, fitted, effect, about, enough=1.0)
+    solver = _evolution(evidence.criteria.global_search)
+    return _shapes_within(evidence, fitted, effect, about, solver)
+
+
+def _evolution(criteria: GlobalSearchCriteria) -> Evolution:
+    """A search that goes on whatever it explains."""
+    return Evolution(
+        population=criteria.population,
+        generations=criteria.generations,
+        patience=criteria.patience,
+        finalists=criteria.finalists,
+    )
 
 
 def _shapes_within(
-    evidence: Evidence, fitted: EvidenceFit, effect: Effect, bounds: np.ndarray, enough: float
+    evidence: Evidence, fitted: EvidenceFit, effect: Effect, bounds: np.ndarray, solver: Evolution
 ) -> ShapeSolution[ScoreTrial]:
-    """Search shapes and values of an effect between bounds (s + 1, 2), logarithms.
-
-    Until a share of what the model leaves is explained that is enough.
-    """
+    """Search shapes and values of an effect between bounds (s + 1, 2), logarithms."""
     shapes = len(effect.shape_parameters(fitted.model.robot))
     lower, upper = bounds.T
 
@@ -340,15 +355,6 @@ def _shapes_within(
             for one in scores
         ]
 
-    systematic, criteria = fitted.error_signal, evidence.criteria.global_search
-    solver = Evolution(
-        population=criteria.population,
-        generations=criteria.generations,
-        enough=-enough * systematic,
-        hope=-criteria.least * systematic,
-        patience=criteria.patience,
-        finalists=criteria.finalists,
-    )
     problem = ShapeProblem(lower=lower, upper=upper, start=(lower + upper) / 2, evaluate=evaluate)
     return search(problem, solver)
 
