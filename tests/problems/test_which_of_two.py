@@ -21,14 +21,12 @@ HIDDEN = {
     "quadratic_drag@joint1": "stribeck_friction@joint1",
 }
 """Each with a rival that the small motions do not tell it from."""
-ENOUGH = 20.0
-"""s of a designed recording that are taken: two of its three repetitions settle as much."""
 
 
 @cache
 def diagnosis(*more: str) -> Diagnosis:
     study = di.load(PROBLEM / "study.toml")
-    made = [di.read(PROBLEM / name).cut(0.0, ENOUGH).replace(period=10.0) for name in more]
+    made = [di.read(PROBLEM / name).replace(period=10.0) for name in more]
     (every,) = numbered(replace(study.train, recordings=(*study.train.recordings, *made)))
     return di.diagnose(study.model, every, propose="never")
 
