@@ -143,7 +143,7 @@ CALLS: dict[str, str] = {
     "di.diagnose(fit, train, propose='maybe')": "DiagnosisTask: propose = 'maybe'. give",
     "di.diagnose(fit, train, progress=True)": "diagnose: progress = True. give a function or None",
     "di.design(robot, train)": "design: model is a Robot. give a Model",
-    "di.design(model, recording, di.experiment_design.DesignTask(harmonics=2, starts=1))": ANSWER,
+    "di.design(model, recording)": ANSWER,
     "di.design(model, train, 'friction')": "design: task = 'friction'. give a DesignTask or None",
     "di.design(model, train, limits=3.0)": "design: limits = 3.0. give a MotionLimits or None",
     "di.validate(fit, test, 'pd')": "validate: controller = 'pd'. give a Controller",

@@ -199,7 +199,7 @@ OTHERS: dict[str, tuple[Content, str]] = {
         r"fit\.json: is not a dynident estimate",
     ),
     "parameters of everything": (
-        damaged("parameters", [{}] * 20_000),
+        damaged("parameters", [{}] * 100_000),
         r"fit\.json: is not a dynident estimate",
     ),
     "a covariance of a million": (

@@ -252,8 +252,8 @@ OTHERS: dict[str, tuple[Content, str]] = {
         "x = " + "[" * 5000 + "]" * 5000 + "\n" + STUDY,
         r"study\.toml: has tables nested too deeply",
     ),
-    "a text of 2 MB": (
-        f'name = "{"x" * 2_000_000}"\n' + STUDY,
+    "a text of 10 MB": (
+        f'name = "{"x" * 10_000_000}"\n' + STUDY,
         r"study\.toml: unknown key 'name'",
     ),
     "a key that paints": (
