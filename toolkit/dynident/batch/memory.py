@@ -39,7 +39,7 @@ def side_by_side(samples: int, shape: tuple[int, ...]) -> np.ndarray:
         weakref.finalize(flat, _give_back, memory).atexit = False
     start = -(flat.ctypes.data // 8) % _LINE
     rows = flat[start : start + count - _LINE].reshape(*shape, lines * _LINE)
-    return np.moveaxis(rows[..., :samples], -1, 0)
+    return rows[..., :samples].transpose(len(shape), *range(len(shape)))
 
 
 def _taken(size: int) -> np.ndarray:

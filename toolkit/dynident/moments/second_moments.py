@@ -152,7 +152,8 @@ class SecondMoments:
     @property
     def count(self) -> int:
         """Rows of all blocks, N."""
-        return int(self.counts if np.ndim(self.counts) == 0 else np.sum(self.counts))
+        counts = self.counts  # asked for a hundred thousand times in a diagnosis
+        return int(counts.sum() if isinstance(counts, np.ndarray) else counts)
 
     # --- blocks of rows -------------------------------------------------------------------------
 

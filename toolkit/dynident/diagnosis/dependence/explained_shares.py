@@ -38,10 +38,11 @@ ORDER = (
 )
 """Which sets may be added in each turn: of several the one that explains most. After a reversal the
 way since then is nearly v^2 / 2a, so that either may stand in for the other, and badly."""
-FIRST = (0.1, 1.0, 10.0, 100.0)
-"""Strengths of the first set: variance of what it predicts over that of what it does not."""
-NEXT = ((1.0, 0.1), (1.0, 1.0), (10.0, 1.0), (10.0, 10.0))
-"""Factors on the strengths of earlier sets, and strength of the next one."""
+FIRST = ((1.0, 0.1), (1.0, 1.0)), ((1.0, 10.0), (1.0, 100.0))
+NEXT = ((1.0, 0.1), (1.0, 1.0)), ((10.0, 1.0), (10.0, 10.0))
+"""Factors on the strengths of earlier sets, and strengths of the first set and of others: variance
+of what a set predicts over that of what nothing does. The second ones are tried where with one of
+the first ones less is left: what predicts nothing predicts no more when it may vary more."""
 LEAST = 0.01
 """Share below which nothing is said: no law is sought for a hundredth of a residual."""
 LEVEL = 0.05
@@ -176,12 +177,16 @@ def _with(
     The regression with the set where that is better, and by how much it falls in each unit, (U,),
     at the strength that the other units choose.
     """
-    strengths = NEXT if before.kernel.any() else [(1.0, one) for one in FIRST]
-    tried = [before]
-    for factor, strength in strengths:
-        more = factor * before.kernel + strength * kernel
-        left = regression.left_of_each_unit(more, y, units)
-        tried.append(_KernelFit(more, _per_unit(left**2, units)))
+    tried, earlier = [before], before.kernel.any()
+    for strengths in NEXT if earlier else FIRST:
+        for factor, strength in strengths:
+            more = strength * kernel
+            if earlier:
+                more += factor * before.kernel
+            left = regression.left_of_each_unit(more, y, units)
+            tried.append(_KernelFit(more, _per_unit(left**2, units)))
+        if min(one.losses.sum() for one in tried[1:]) >= before.losses.sum():
+            break
     losses = np.array([one.losses for one in tried])
     fall = before.losses - losses[_chosen_elsewhere(losses), np.arange(len(units))]
     return tried[_best(losses)], fall

@@ -17,6 +17,7 @@ from scipy.special import stdtr, stdtrit
 from dynident.criteria import ContactCriteria, Criteria
 from dynident.effects import FRICTION_WIDTH
 from dynident.evidence.noise_model import SpeedClasses, measure_noise
+from dynident.moments.solution import orthonormal
 
 QUARTER = 0.6745
 """Median of the absolute value of a standard normal variable."""
@@ -268,11 +269,12 @@ def _changes(one: Repeated, kept: np.ndarray, criteria: ContactCriteria) -> np.n
     others = (one.residual.sum(axis=0) - one.residual) / (count - 1)
     found = one.residual - others
     for change, v in zip(found, one.speed, strict=True):
-        columns = _slow(v)
+        # Orthonormal, so that their products with weights lose no digits.
+        columns = orthonormal(_slow(v), 1e-8)
         weight, rest = kept.astype(float), change
         for step in range(10):
-            root = np.sqrt(weight)
-            x = np.linalg.lstsq(columns * root[:, None], change * root, rcond=1e-8)[0]
+            weighted = columns.T * weight
+            x = np.linalg.lstsq(weighted @ columns, weighted @ change, rcond=1e-14)[0]
             rest = change - columns @ x
             usual = 1.4826 * float(np.median(np.abs(rest[kept])))
             size = np.abs(rest) / max(usual, 1e-300)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 
 
@@ -13,7 +16,11 @@ def solve_band(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     band : (d, T) its diagonals: band[i - j, j] = A[i, j].
     right : (T,)
     """
-    from scipy.linalg import get_lapack_funcs
+    return _solver()(band, right[:, None], uplo="L")[0][:, 0]
 
-    (solve,) = get_lapack_funcs(("tbtrs",), (band, right))
-    return solve(band, right[:, None], uplo="L")[0][:, 0]
+
+@cache
+def _solver() -> Any:
+    from scipy.linalg import get_lapack_funcs  # takes long to load
+
+    return get_lapack_funcs(("tbtrs",))[0]

@@ -16,15 +16,20 @@ from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.low_pass.sections import state_at_rest
 
-_LANES = 4  # columns that are filtered together: wider vectors than the processor has are slow
+_MOST_LANES = 8  # columns that are filtered together: wider vectors than the processor's are slow
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
+_LONG = np.dtype(ctypes.c_long)
+_SIZE, _PLACE = ctypes.c_long, ctypes.c_void_p
+_READ = (_SIZE, _SIZE, _SIZE, _PLACE, _PLACE, _PLACE, _SIZE, _PLACE)
+_ARGUMENTS = (*_READ, _PLACE, _SIZE, _PLACE, _PLACE, _SIZE, _PLACE)
 _ENTRY = "dynident_zero_phase"
-_SOURCE = """\
-typedef double lanes __attribute__((vector_size({bytes}), aligned(8)));
+_GROUP = """\
+typedef double lanes{lanes} __attribute__((vector_size({bytes}), aligned(8)));
 
-static void filter(long samples, const double *sos, const double *rest, lanes *w, long step)
+static void filter{lanes}(long samples, const double *sos, const double *rest, lanes{lanes} *w,
+    long step)
 {{
-    lanes x, y, {states};
+    lanes{lanes} x, y, {states};
 {start}
     for (long k = 0; k < samples; k++, w += step) {{
         y = *w;
@@ -33,27 +38,44 @@ static void filter(long samples, const double *sos, const double *rest, lanes *w
     }}
 }}
 
-void {entry}(long samples, long padding, long columns, const double *sos, const double *rest,
-    const double *x, long down, const long *from, lanes *w,
+static void group{lanes}(long samples, long padding, long some, const double *sos,
+    const double *rest, const double *x, long down, const long *from, lanes{lanes} *w,
     long kept, const long *rows, double *y, long below, const long *to)
 {{
     const long all = samples + 2 * padding;
-    lanes *first = w + padding, *last = first + samples - 1;
-    for (long c = 0; c < columns; c += {lanes}) {{
-        const long some = columns - c < {lanes} ? columns - c : {lanes};
-        const double *each[{lanes}];
-        for (long v = 0; v < {lanes}; v++) each[v] = x + from[c + (v < some ? v : 0)];
-        for (long k = 0; k < samples; k++)
-            for (long v = 0; v < {lanes}; v++) first[k][v] = each[v][k * down];
-        for (long k = 1; k <= padding; k++) {{
-            first[-k] = 2.0 * *first - first[k];
-            last[k] = 2.0 * *last - last[-k];
-        }}
-        filter(all, sos, rest, w, 1);
-        filter(all, sos, rest, w + all - 1, -1);
-        for (long v = 0; v < some; v++)
-            for (long k = 0; k < kept; k++) y[to[c + v] + k * below] = first[rows[k]][v];
+    lanes{lanes} *first = w + padding, *last = first + samples - 1;
+    const double *each[{lanes}];
+    for (long v = 0; v < {lanes}; v++) each[v] = x + from[v < some ? v : 0];
+    for (long k = 0; k < samples; k++)
+        for (long v = 0; v < {lanes}; v++) first[k][v] = each[v][k * down];
+    for (long k = 1; k <= padding; k++) {{
+        first[-k] = 2.0 * *first - first[k];
+        last[k] = 2.0 * *last - last[-k];
     }}
+    filter{lanes}(all, sos, rest, w, 1);
+    filter{lanes}(all, sos, rest, w + all - 1, -1);
+    for (long v = 0; v < some; v++)
+        for (long k = 0; k < kept; k++) y[to[v] + k * below] = first[rows[k]][v];
+}}
+"""
+_SOURCE = """\
+{narrow}
+#ifdef __AVX512F__
+{wide}
+#endif
+void {entry}(long samples, long padding, long columns, const double *sos, const double *rest,
+    const double *x, long down, const long *from, double *w,
+    long kept, const long *rows, double *y, long below, const long *to)
+{{
+    long c = 0;
+#ifdef __AVX512F__
+    for (; columns - c > 4; c += 8)
+        group8(samples, padding, columns - c < 8 ? columns - c : 8, sos, rest, x, down, from + c,
+            (lanes8 *)w, kept, rows, y, below, to + c);
+#endif
+    for (; c < columns; c += 4)
+        group4(samples, padding, columns - c < 4 ? columns - c : 4, sos, rest, x, down, from + c,
+            (lanes4 *)w, kept, rows, y, below, to + c);
 }}
 """
 
@@ -110,12 +132,18 @@ def zero_phase(
 
 @cache
 def _source(sections: int) -> str:
-    """A filter of so many sections in C; their states stay in registers."""
-    each = range(sections)
+    """A filter of so many sections in C."""
     return _SOURCE.format(
-        bytes=8 * _LANES,
-        lanes=_LANES,
-        entry=_ENTRY,
+        entry=_ENTRY, narrow=_group(4, sections), wide=_group(_MOST_LANES, sections)
+    )
+
+
+def _group(lanes: int, sections: int) -> str:
+    """The filter of so many columns together; the states of all sections stay in registers."""
+    each = range(sections)
+    return _GROUP.format(
+        bytes=8 * lanes,
+        lanes=lanes,
         states=", ".join(f"a{s}, b{s}" for s in each),
         start="\n".join(
             f"    a{s} = rest[{2 * s}] * *w, b{s} = rest[{2 * s + 1}] * *w;" for s in each
@@ -142,22 +170,17 @@ def _compiled(
     if not x.flags.aligned or any(stride % x.itemsize for stride in x.strides):
         x = x.copy()  # a field of packed records: its numbers are no whole numbers apart
     samples = len(x)
-    work = side_by_side((samples + 2 * padding) * _LANES, ())
+    work = side_by_side((samples + 2 * padding) * _MOST_LANES, ())
     sos, rest = np.ascontiguousarray(sections), _state_at_rest(sections.tobytes(), len(sections))
     (down, across), (below, beside) = ((s // 8 for s in one.strides) for one in (x, y))
-    rows = np.ascontiguousarray(rows, dtype=ctypes.c_long)
-    places, to = (np.asarray(columns * step, dtype=ctypes.c_long) for step in (across, beside))
-    pointer = {id(one): ctypes.c_void_p(one.ctypes.data) for one in (sos, rest, x, places, work)}
-    sizes = [ctypes.c_long(size) for size in (samples, padding, len(columns))]
+    rows = np.ascontiguousarray(rows, dtype=_LONG)
+    places, to = (np.asarray(columns * step, dtype=_LONG) for step in (across, beside))
+    read = (one.ctypes.data for one in (sos, rest, x))
+    if function.argtypes is None:
+        function.argtypes = _ARGUMENTS
     function(
-        *sizes,
-        *(pointer[id(one)] for one in (sos, rest, x)),
-        ctypes.c_long(down),
-        *(pointer[id(one)] for one in (places, work)),
-        ctypes.c_long(len(rows)),
-        *(ctypes.c_void_p(one.ctypes.data) for one in (rows, y)),
-        ctypes.c_long(below),
-        ctypes.c_void_p(to.ctypes.data),
+        *(samples, padding, len(columns), *read, down, places.ctypes.data, work.ctypes.data),
+        *(len(rows), rows.ctypes.data, y.ctypes.data, below, to.ctypes.data),
     )
 
 
