@@ -17,11 +17,9 @@ import numpy as np
 from dynident.batch import side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.filters import FORGOTTEN, Filter, butterworth, memory
-from dynident.recording.low_pass.zero_phase import zero_phase
+from dynident.recording.low_pass.zero_phase import FilteredColumns, zero_phase_columns
 
 _FEW = 8  # columns, of which it costs more to find the empty ones than to filter them
-_AT_ONCE = 64
-"""Columns filtered at a time; bounds the temporary memory."""
 
 
 @dataclass(frozen=True)
@@ -219,26 +217,22 @@ class ParallelFilter:
     def apply_each(
         self, xs: Sequence[np.ndarray], block: FilterBlock | None = None
     ) -> list[np.ndarray]:
-        """As `apply`, or `apply_block`, of several: narrow ones together, which costs less.
+        """As `apply`, or `apply_block`, of several together, which costs less.
 
         Parameters
         ----------
         xs : (T, ...) each, of as many samples.
         block : of which they are the samples; None for complete records.
         """
-        found = []
-        for group in _narrow_together(xs):
-            rows = self.rows(len(group[0])) if block is None else block.rows
-            flat = [np.asarray(x, dtype=float).reshape(len(x), _width(x)) for x in group]
-            # Samples side by side: written and read in one piece, several times as fast.
-            joined = flat[0] if len(flat) == 1 else np.concatenate([x.T for x in flat]).T
-            together = self._filtered(joined, rows)
-            parts = np.split(together, np.cumsum([_width(x) for x in group[:-1]]), axis=1)
-            found += [
-                np.ascontiguousarray(part).reshape(len(rows), *x.shape[1:])
-                for part, x in zip(parts, group, strict=True)
-            ]
-        return found
+        if not xs:
+            return []
+        rows = self.rows(len(xs[0])) if block is None else block.rows
+        every = [np.asarray(x, dtype=float) for x in xs]
+        if not self.stages:
+            return [np.ascontiguousarray(x[_as_slice(rows)]) for x in every]
+        out = [np.empty((len(rows), _width(x))) for x in every]
+        self._filter(every, rows, out)
+        return [y.reshape(len(rows), *x.shape[1:]) for x, y in zip(every, out, strict=True)]
 
     def low_pass(self, x: np.ndarray) -> np.ndarray:
         """Filter without decimating, (T, ...) -> (T, ...); symmetric but for the ends."""
@@ -247,19 +241,30 @@ class ParallelFilter:
     def _filtered(self, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if not self.stages:
             return x[_as_slice(rows)]
-        flat = x.reshape(len(x), _width(x))
         aside = x.ndim > 2 and x.strides[0] == x.itemsize
-        shape = (len(rows), flat.shape[1])
-        result = side_by_side(len(rows), shape[1:]) if aside else np.empty(shape)
-        used = _used(flat)
-        if len(used) < flat.shape[1]:
-            result[:] = 0.0
-        y = flat
-        for sections, padding in self.stages[:-1]:
-            y = zero_phase(y, sections, padding, self.where, columns=used)
-        sections, padding = self.stages[-1]
-        zero_phase(y, sections, padding, self.where, rows=rows, columns=used, out=result)
-        return result.reshape(len(rows), *x.shape[1:])
+        shape = (len(rows), _width(x))
+        out = side_by_side(len(rows), shape[1:]) if aside else np.empty(shape)
+        self._filter([x], rows, [out])
+        return out.reshape(len(rows), *x.shape[1:])
+
+    def _filter(
+        self, xs: Sequence[np.ndarray], rows: np.ndarray, out: Sequence[np.ndarray]
+    ) -> None:
+        """Filter and decimate arrays (T, ...) into others (kept rows, columns)."""
+        parts = []
+        for x, result in zip(xs, out, strict=True):
+            flat = x.reshape(len(x), _width(x))
+            used = _used(flat)
+            if len(used) < flat.shape[1]:
+                result[:] = 0.0
+            parts.append(FilteredColumns(flat, used, result))
+        *before, (sections, padding) = self.stages
+        for some in [[part] for part in parts] if before else [parts]:  # whole copies of one alone
+            for earlier in before:
+                whole = [replace(one, out=np.empty(one.x.shape)) for one in some]
+                zero_phase_columns(whole, *earlier, self.where)
+                some = [replace(a, x=b.out) for a, b in zip(some, whole, strict=True)]
+            zero_phase_columns(some, sections, padding, self.where, rows=rows)
 
 
 def _used(flat: np.ndarray) -> np.ndarray:
@@ -286,20 +291,6 @@ def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
 
 def _width(x: np.ndarray) -> int:
     return math.prod(x.shape[1:])
-
-
-def _narrow_together(xs: Sequence[np.ndarray]) -> Iterator[list[np.ndarray]]:
-    """Arrays in their order, in groups of no more columns than are filtered at a time."""
-    group: list[np.ndarray] = []
-    width = 0
-    for x in xs:
-        width += _width(x)
-        if group and width > _AT_ONCE:
-            yield group
-            group, width = [], _width(x)
-        group.append(x)
-    if group:
-        yield group
 
 
 def choose_factor(rate_hz: float, target_rate: float, period: float | None = None) -> int:

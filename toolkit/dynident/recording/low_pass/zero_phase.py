@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
@@ -20,8 +22,7 @@ _MOST_LANES = 8  # columns that are filtered together: wider vectors than the pr
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
 _LONG = np.dtype(ctypes.c_long)
 _SIZE, _PLACE = ctypes.c_long, ctypes.c_void_p
-_READ = (_SIZE, _SIZE, _SIZE, _PLACE, _PLACE, _PLACE, _SIZE, _PLACE)
-_ARGUMENTS = (*_READ, _PLACE, _SIZE, _PLACE, _PLACE, _SIZE, _PLACE)
+_ARGUMENTS = (*(_SIZE,) * 3, *(_PLACE,) * 5, _SIZE, *(_PLACE,) * 3)
 _ENTRY = "dynident_zero_phase"
 _GROUP = """\
 typedef double lanes{lanes} __attribute__((vector_size({bytes}), aligned(8)));
@@ -39,15 +40,17 @@ static void filter{lanes}(long samples, const double *sos, const double *rest, l
 }}
 
 static void group{lanes}(long samples, long padding, long some, const double *sos,
-    const double *rest, const double *x, long down, const long *from, lanes{lanes} *w,
-    long kept, const long *rows, double *y, long below, const long *to)
+    const double *rest, const double *const *x, const long *down, lanes{lanes} *w,
+    long kept, const long *rows, double *const *y, const long *below)
 {{
     const long all = samples + 2 * padding;
     lanes{lanes} *first = w + padding, *last = first + samples - 1;
     const double *each[{lanes}];
-    for (long v = 0; v < {lanes}; v++) each[v] = x + from[v < some ? v : 0];
+    long step[{lanes}];
+    for (long v = 0; v < {lanes}; v++) each[v] = x[v < some ? v : 0];
+    for (long v = 0; v < {lanes}; v++) step[v] = down[v < some ? v : 0];
     for (long k = 0; k < samples; k++)
-        for (long v = 0; v < {lanes}; v++) first[k][v] = each[v][k * down];
+        for (long v = 0; v < {lanes}; v++) first[k][v] = each[v][k * step[v]];
     for (long k = 1; k <= padding; k++) {{
         first[-k] = 2.0 * *first - first[k];
         last[k] = 2.0 * *last - last[-k];
@@ -55,7 +58,7 @@ static void group{lanes}(long samples, long padding, long some, const double *so
     filter{lanes}(all, sos, rest, w, 1);
     filter{lanes}(all, sos, rest, w + all - 1, -1);
     for (long v = 0; v < some; v++)
-        for (long k = 0; k < kept; k++) y[to[v] + k * below] = first[rows[k]][v];
+        for (long k = 0; k < kept; k++) y[v][k * below[v]] = first[rows[k]][v];
 }}
 """
 _SOURCE = """\
@@ -64,70 +67,100 @@ _SOURCE = """\
 {wide}
 #endif
 void {entry}(long samples, long padding, long columns, const double *sos, const double *rest,
-    const double *x, long down, const long *from, double *w,
-    long kept, const long *rows, double *y, long below, const long *to)
+    const double *const *x, const long *down, double *w,
+    long kept, const long *rows, double *const *y, const long *below)
 {{
     long c = 0;
 #ifdef __AVX512F__
     for (; columns - c > 4; c += 8)
-        group8(samples, padding, columns - c < 8 ? columns - c : 8, sos, rest, x, down, from + c,
-            (lanes8 *)w, kept, rows, y, below, to + c);
+        group8(samples, padding, columns - c < 8 ? columns - c : 8, sos, rest, x + c, down + c,
+            (lanes8 *)w, kept, rows, y + c, below + c);
 #endif
     for (; c < columns; c += 4)
-        group4(samples, padding, columns - c < 4 ? columns - c : 4, sos, rest, x, down, from + c,
-            (lanes4 *)w, kept, rows, y, below, to + c);
+        group4(samples, padding, columns - c < 4 ? columns - c : 4, sos, rest, x + c, down + c,
+            (lanes4 *)w, kept, rows, y + c, below + c);
 }}
 """
 
 
+@dataclass(frozen=True, eq=False)
+class FilteredColumns:
+    """Columns to filter, and where they go.
+
+    Attributes
+    ----------
+    x : (T, k) of any quantity.
+    chosen : numbers of the columns that are filtered.
+    out : (R, k) whose other columns stay as they are.
+    """
+
+    x: np.ndarray
+    chosen: np.ndarray
+    out: np.ndarray
+
+
 def zero_phase(
-    x: np.ndarray,
-    sections: np.ndarray,
-    padding: int,
-    where: str | None = None,
-    *,
-    rows: np.ndarray | None = None,
-    columns: np.ndarray | None = None,
-    out: np.ndarray | None = None,
+    x: np.ndarray, sections: np.ndarray, padding: int, where: str | None = None
 ) -> np.ndarray:
     """Filter forward and backward along axis 0, as SciPy's `sosfiltfilt` with odd padding.
 
     Parameters
     ----------
     x : (T, ...) of any quantity.
-    sections : of the filter, (s, 6) as `butterworth_sections` gives them.
-    padding : samples of point reflection at each end.
-    where : file, for messages.
-    rows : (R,) the rows that are wanted; None for all.
-    columns : which of the columns of a two-dimensional x are filtered; None for all.
-    out : (R, columns of x) whose other columns stay as they are; if there is none, it is made.
+    sections, padding, where : as for `zero_phase_columns`.
 
     Returns
     -------
-    (R, ...) filtered twice, without delay.
+    (T, ...) filtered twice, without delay.
 
     Raises
     ------
     RecordingError
         If x has no more rows than the padding.
     """
-    if len(x) <= padding:
-        raise RecordingError(
-            f"{len(x)} samples are too few to filter", where, f"at least {padding + 1} are needed"
-        )
     flat = np.asarray(x, dtype=float).reshape(len(x), math.prod(x.shape[1:]))
-    some = np.arange(flat.shape[1]) if columns is None else columns
-    kept = len(x) if rows is None else len(rows)
-    result = np.empty((kept, flat.shape[1])) if out is None else out
+    one = FilteredColumns(flat, np.arange(flat.shape[1]), np.empty(flat.shape))
+    zero_phase_columns([one], sections, padding, where)
+    return one.out.reshape(x.shape)
+
+
+def zero_phase_columns(
+    parts: Sequence[FilteredColumns],
+    sections: np.ndarray,
+    padding: int,
+    where: str | None = None,
+    *,
+    rows: np.ndarray | None = None,
+) -> None:
+    """Filter columns of several arrays as `zero_phase`, and write them where they go.
+
+    Parameters
+    ----------
+    parts : of as many samples.
+    sections : of the filter, (s, 6) as `butterworth_sections` gives them.
+    padding : samples of point reflection at each end.
+    where : file, for messages.
+    rows : (R,) the rows that are wanted; None for all.
+
+    Raises
+    ------
+    RecordingError
+        If there are no more rows than the padding.
+    """
+    samples = len(parts[0].x)
+    if samples <= padding:
+        raise RecordingError(
+            f"{samples} samples are too few to filter", where, f"at least {padding + 1} are needed"
+        )
     function = c_function(_source(len(sections)), _ENTRY)
-    if function is None:
-        for part in np.array_split(some, max(1, len(some) // _AT_ONCE)):
-            y = _by_scipy(flat[:, part], sections, padding)
-            result[:, part] = y if rows is None else y[rows]
-    else:
-        rows = np.arange(kept) if rows is None else rows
-        _compiled(function, flat, sections, padding, (rows, some, result))
-    return result.reshape(kept, *x.shape[1:]) if out is None else result
+    if function is not None:
+        wanted = np.arange(samples) if rows is None else rows
+        _compiled(function, parts, sections, padding, wanted)
+        return
+    for part in parts:
+        for some in np.array_split(part.chosen, max(1, len(part.chosen) // _AT_ONCE)):
+            y = _by_scipy(part.x[:, some], sections, padding)
+            part.out[:, some] = y if rows is None else y[rows]
 
 
 @cache
@@ -160,28 +193,43 @@ def _group(lanes: int, sections: int) -> str:
 
 def _compiled(
     function: Any,
-    x: np.ndarray,
+    parts: Sequence[FilteredColumns],
     sections: np.ndarray,
     padding: int,
-    wanted: tuple[np.ndarray, np.ndarray, np.ndarray],
+    rows: np.ndarray,
 ) -> None:
-    """Write wanted rows of the wanted columns to their places in an array."""
-    rows, columns, y = wanted
-    if not x.flags.aligned or any(stride % x.itemsize for stride in x.strides):
-        x = x.copy()  # a field of packed records: its numbers are no whole numbers apart
-    samples = len(x)
+    """Write wanted rows of columns to their places."""
+    samples = len(parts[0].x)
     work = side_by_side((samples + 2 * padding) * _MOST_LANES, ())
     sos, rest = np.ascontiguousarray(sections), _state_at_rest(sections.tobytes(), len(sections))
-    (down, across), (below, beside) = ((s // 8 for s in one.strides) for one in (x, y))
+    read, written = [_whole_strides(one.x) for one in parts], [one.out for one in parts]
+    chosen = [one.chosen.tolist() for one in parts]
+    (x, down), (y, below) = _places(read, chosen), _places(written, chosen)
     rows = np.ascontiguousarray(rows, dtype=_LONG)
-    places, to = (np.asarray(columns * step, dtype=_LONG) for step in (across, beside))
-    read = (one.ctypes.data for one in (sos, rest, x))
     if function.argtypes is None:
         function.argtypes = _ARGUMENTS
-    function(
-        *(samples, padding, len(columns), *read, down, places.ctypes.data, work.ctypes.data),
-        *(len(rows), rows.ctypes.data, y.ctypes.data, below, to.ctypes.data),
+    given, found = (
+        [one.ctypes.data for one in some] for some in ((sos, rest, x, down, work), (rows, y, below))
     )
+    function(samples, padding, len(x), *given, len(rows), *found)
+
+
+def _whole_strides(x: np.ndarray) -> np.ndarray:
+    """Columns (T, k) whose numbers are whole numbers apart: those of packed records are copied."""
+    apart = x.flags.aligned and all(stride % x.itemsize == 0 for stride in x.strides)
+    return x if apart else x.copy()
+
+
+def _places(
+    every: Sequence[np.ndarray], chosen: Sequence[Sequence[int]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Address of the first number of each column, and numbers from one sample to the next."""
+    first, steps = [], []
+    for one, columns in zip(every, chosen, strict=True):
+        (down, across), start = one.strides, one.ctypes.data
+        first += [start + across * column for column in columns]
+        steps += [down // one.itemsize] * len(columns)
+    return np.array(first, dtype=np.uintp), np.array(steps, dtype=_LONG)
 
 
 def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
