@@ -93,7 +93,10 @@ class Stack:
             signals = [each[-1:] for each in signals]
         elif self.kind == "repeated":
             signals = [each[:1] for each in signals]
-        weights = noise.weights(self._speeds[joint])
+        of, weights = self._latest_weights.get(joint, (None, np.empty(0)))
+        if of is not noise:  # every candidate is whitened by the same
+            weights = noise.weights(self._speeds[joint])
+            self._latest_weights[joint] = noise, weights
         told = None if self._told is None else self._told[joint]
         white = noise.whitened(signals, weights, told)
         last = white.shape[1] - 1
@@ -113,6 +116,11 @@ class Stack:
     @property
     def _simulated(self) -> bool:
         return self.runs[0].columns_from == "simulation"
+
+    @cached_property
+    def _latest_weights(self) -> dict[int, tuple[NoiseModel, np.ndarray]]:
+        """Of each joint: the noise that was asked for last, and its weights (R, T)."""
+        return {}
 
     @cached_property
     def _speeds(self) -> np.ndarray:

@@ -44,7 +44,7 @@ class Repeated:
     speed: np.ndarray
     certain: np.ndarray
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Time from one instant to the next, s."""
         return float(np.median(np.diff(self.t, axis=1)))

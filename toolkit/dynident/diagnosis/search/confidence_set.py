@@ -8,7 +8,7 @@ the last draw as in the package `arch`, which takes a second to load.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, .
     if models < 2 or count < 3 or not np.any(varied):
         return tuple(range(models))
     errors = losses - losses.mean(axis=0)
-    drawn = np.array([errors[rows].mean(axis=0) for rows in _resampled(count, criteria)])
+    drawn = _weights(count, criteria.set_draws, criteria.set_block) @ errors
     kept = np.arange(models)
     while len(kept) > 1:
         chance = drawn[:, kept] - drawn[:, kept].mean(axis=1, keepdims=True)
@@ -87,11 +87,23 @@ def _speaks_for(worse: np.ndarray) -> bool:
     return bool(-worse.min() >= np.median(worse))
 
 
-def _resampled(count: int, criteria: SearchCriteria) -> Iterator[np.ndarray]:
-    """Yield draws of blocks of time (B,), in runs of random length that go round at the end."""
+@lru_cache(maxsize=4)
+def _weights(count: int, draws: int, length: float) -> np.ndarray:
+    """Share of each block of time in each draw (D, B), of runs that go round at the end.
+
+    The draws are the same ever again: they are asked for with every ranking.
+
+    Parameters
+    ----------
+    count : of blocks.
+    draws, length : of the bootstrap, and mean of the random length of a run.
+    """
     random, places = np.random.default_rng(_SEED), np.arange(count)
-    for _ in range(criteria.set_draws):
+    found = np.empty((draws, count))
+    for weights in found:
         starts = random.integers(count, size=count)
-        begins = random.random(count) <= 1.0 / criteria.set_block
+        begins = random.random(count) <= 1.0 / length
         begin = np.maximum.accumulate(np.where(begins, places, 0))
-        yield (starts[begin] + places - begin) % count
+        rows = (starts[begin] + places - begin) % count
+        weights[:] = np.bincount(rows, minlength=count) / count
+    return found

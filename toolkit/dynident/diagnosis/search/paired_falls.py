@@ -100,9 +100,11 @@ def _sums(judged: HeldOut) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             continue
         squares = (np.ones_like(run.measured), run.measured**2, run.residual**2)
         counted = [np.where(run.certain, one, 0.0) for one in squares]
-        for block in np.unique(run.block):
-            found.append([one[run.block == block].sum(axis=0) for one in counted])
+        blocks, places = np.unique(run.block, return_inverse=True)
+        columns = np.concatenate(counted, axis=1).T
+        found.append([np.bincount(places, column, len(blocks)) for column in columns])
     n = judged.runs[0].measured.shape[1]
-    rows, torque, left = np.moveaxis(np.array(found).reshape(-1, 3, n), 1, 0)
+    every = np.concatenate(found, axis=1) if found else np.zeros((3 * n, 0))
+    rows, torque, left = np.swapaxes(every.reshape(3, n, -1), 1, 2)
     kept = rows.any(axis=1)
     return rows[kept], torque[kept], left[kept]
