@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import mul
 
 import numpy as np
 
@@ -110,6 +111,23 @@ class Block:
         if joint not in self._directions:
             self._directions[joint] = self.sign(self.v[:, [self.index(joint)]], joint)
         return self._directions[joint]
+
+    def circling(self, joint: str | None, times: int) -> np.ndarray:
+        """exp(i times q) of a joint's position q, (T,), of whole numbers from 1 on.
+
+        A product of its powers of two, which are made once, for all that ask: several times as fast
+        as sine and cosine.
+        """
+        powers = self._circling.setdefault(joint, [])
+        if not powers:
+            powers.append(np.exp(1j * self.q[:, self.index(joint)]))
+        while len(powers) < times.bit_length():
+            powers.append(powers[-1] ** 2)
+        return reduce(mul, (one for k, one in enumerate(powers) if times >> k & 1))
+
+    @cached_property
+    def _circling(self) -> dict[str | None, list[np.ndarray]]:
+        return {}
 
     @cached_property
     def _directions(self) -> dict[str | None, np.ndarray]:

@@ -106,8 +106,7 @@ class Stack:
     def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:
         """Second moments of whitened columns, (B, ..., a, P, L) and (B, ..., b, P, L)."""
         kind: Kind = "single" if self._simulated else self.kind
-        counts = np.tile(np.diff(self.runs[0].edges), len(self.runs))
-        return replicate_moments(left, right, counts, kind)
+        return replicate_moments(left, right, self._counts, kind)
 
     def unfolded(self, white: np.ndarray) -> np.ndarray:
         """Whitened columns (R, P, S, k), as they follow each other in each recording."""
@@ -116,6 +115,11 @@ class Stack:
     @property
     def _simulated(self) -> bool:
         return self.runs[0].columns_from == "simulation"
+
+    @cached_property
+    def _counts(self) -> np.ndarray:
+        """Instants of each block, (B,)."""
+        return np.tile(np.diff(self.runs[0].edges), len(self.runs))
 
     @cached_property
     def _latest_weights(self) -> dict[int, tuple[NoiseModel, np.ndarray]]:

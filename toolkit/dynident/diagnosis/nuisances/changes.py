@@ -178,6 +178,8 @@ class Changes:
 
 def _filtered(colour: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Samples (T, ...) through a filter without feedback, zeros before the first."""
+    if x.ndim == 1 and len(x):
+        return np.convolve(x, colour)[: len(x)]
     found = np.zeros(x.shape)
     for lag, weight in enumerate(colour[: len(x)]):
         found[lag:] += weight * x[: len(x) - lag]
@@ -270,12 +272,14 @@ def _changes(one: Repeated, kept: np.ndarray, criteria: ContactCriteria) -> np.n
     found = one.residual - others
     for change, v in zip(found, one.speed, strict=True):
         # Orthonormal, so that their products with weights lose no digits.
-        columns = orthonormal(_slow(v), 1e-8)
+        slow = np.ascontiguousarray(orthonormal(_slow(v), 1e-8).T)
         weight, rest = kept.astype(float), change
         for step in range(10):
-            weighted = columns.T * weight
-            x = np.linalg.lstsq(weighted @ columns, weighted @ change, rcond=1e-14)[0]
-            rest = change - columns @ x
+            weighted = slow * weight
+            products = weighted @ slow.T
+            # Where hardly any instant counts, they may be singular.
+            products[np.diag_indices_from(products)] += 1e-14 * np.trace(products) + 1e-300
+            rest = change - np.linalg.solve(products, weighted @ change) @ slow
             usual = 1.4826 * float(np.median(np.abs(rest[kept])))
             size = np.abs(rest) / max(usual, 1e-300)
             # Huber's weights find the bulk; Tukey's then forget what is far from it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -159,10 +159,18 @@ class DitheredReversal(OtherReversal):
 @lru_cache(maxsize=64)
 def _mean_over_jitter(s: float, r: float) -> tuple[np.ndarray, np.ndarray]:
     """Speeds over the width, and dry friction over its level there."""
-    nodes, weights = hermegauss(_NODES)
+    nodes, weights = _quadrature()
     x = np.linspace(0.0, _FAST, 500)
     jitter = s / np.sqrt(1.0 + r / np.cosh(x) ** 2)
-    return x, np.tanh(x[:, None] + jitter[:, None] * nodes) @ (weights / weights.sum())
+    return x, np.tanh(x[:, None] + jitter[:, None] * nodes) @ weights
+
+
+@cache
+def _quadrature() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of a standard normal variable, but for those that add nothing, and their weights."""
+    nodes, weights = hermegauss(_NODES)
+    counting = weights > np.finfo(float).eps ** 2 * weights.max()
+    return nodes[counting], weights[counting] / weights[counting].sum()
 
 
 LAWS = (SmoothReversal, StraightReversal, DitheredReversal)

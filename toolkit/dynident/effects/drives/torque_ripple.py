@@ -14,6 +14,7 @@ from dynident.effects.effect import (
 )
 
 _MOST_IN_A_TURN = 500.0
+_FEW = 63  # per revolution: as whole numbers they are products of no more than six powers
 _PER_TURN = ShapeParameter(
     "k",
     "1/rev",
@@ -72,5 +73,9 @@ class TorqueRipple(JointEffect):
         return _PER_TURN.grid[-1], _MOST_IN_A_TURN
 
     def at_joint(self, block: Block) -> np.ndarray:
-        phase = self.shape[0] * block.q[:, [block.index(self.joint)]]
+        (k,) = self.shape
+        if k.is_integer() and k <= _FEW and block.q.dtype == float:  # neither symbols nor far away
+            z = block.circling(self.joint, int(k))
+            return np.stack([z.imag, z.real], axis=1)
+        phase = k * block.q[:, [block.index(self.joint)]]
         return np.hstack([np.sin(phase), np.cos(phase)])
