@@ -136,17 +136,24 @@ class NoiseModel:
         if order == 0:
             return scaled
         every = scaled.reshape(-1, order + samples)
-        white, some = np.empty((len(every), samples)), max(1, _AT_ONCE // max(1, samples))
-        for first in range(0, len(every), some):
-            rows = every[first : first + some]
-            found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
-            apart = (rows.strides[0], found.itemsize)
-            white[first : first + some] = as_strided(found, (len(rows), samples), apart)
+        if every.size <= _AT_ONCE:
+            white = self._correlated(every)
+        else:
+            white, some = np.empty((len(every), samples)), max(1, _AT_ONCE // max(1, samples))
+            for first in range(0, len(every), some):
+                last = first + some
+                white[first:last] = self._correlated(every[first:last])
         found = white.reshape(*scaled.shape[:3], samples)
         if told is not None:
             found *= told[:, None, None]
             self._whiten_starts(scaled[..., order:], found, told)
         return found
+
+    def _correlated(self, rows: np.ndarray) -> np.ndarray:
+        """Signals (k, order + T) through the filter, (k, T)."""
+        found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
+        shape = len(rows), rows.shape[1] - len(self.colour) + 1
+        return as_strided(found, shape, (rows.strides[0], found.itemsize))
 
     def _whiten_starts(self, rows: np.ndarray, white: np.ndarray, told: np.ndarray) -> None:
         """Whiten samples before which fewer count than the order, each by those that do.

@@ -42,9 +42,9 @@ def in_blocks(replicates: Sequence[np.ndarray], edges: np.ndarray) -> np.ndarray
     lengths = np.diff(edges)
     shape = len(lengths), columns, len(replicates), lengths.max(initial=0)
     found = np.zeros((recordings, *shape))
-    for p, one in enumerate(replicates):
-        for b, (start, stop) in enumerate(pairwise(edges.tolist())):
-            found[:, b, :, p, : stop - start] = one[..., start:stop]
+    every = np.stack(replicates, axis=2)
+    for b, (start, stop) in enumerate(pairwise(edges.tolist())):
+        found[:, b, ..., : stop - start] = every[..., start:stop]
     return found.reshape(-1, *shape[1:])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,14 +88,15 @@ def regression_values(moments: SecondMoments, least_reliability: float) -> np.nd
     FitError
         If a moment is not finite.
     """
-    scale, signal = np.sqrt(np.diag(moments.gram)), moments.signal
-    if not (np.all(scale > 0) and np.all(np.isfinite(signal)) and np.all(np.isfinite(scale))):
+    scale, signal = np.sqrt(moments.gram.diagonal()), moments.signal
+    # The minimum and the sum of numbers one of which is none are none either.
+    if not (scale.min(initial=1.0) > 0 and math.isfinite(scale.sum() + signal.sum())):
         return regress(moments, least_reliability).values
-    units = np.outer(scale, scale)
+    units = scale[:, None] * scale
     total, free = moments.gram / units, signal[:-1, :-1] / units
     pivoted, order, rank, _ = _pstrf(total, tol=_DEPENDENT)
     some, others = order[:rank] - 1, order[rank:] - 1
-    among = np.ix_(some, some)
+    among = some[:, None], some
     whole, factor = total[among], pivoted[:rank, :rank]
     own = factor if _is_sound(factor, whole) else None
     if own is not None and moments.noise_free is not None:
