@@ -7,7 +7,7 @@ starts, and the conic bound beside the answer; but a program that can be extende
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -245,18 +245,27 @@ class NonlinearSolution:
         return self.solution.violation <= TOLERANCE
 
 
-def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
+def solve_nonlinear(problem: Problem, bound: float, seed: int = 0) -> NonlinearSolution:
     """Solve a problem as a nonlinear program, from several starts.
 
     The first starts are the prior's own bodies, and the answer without constraints, each link
     replaced by the nearest possible one; where they end in different places, random ones follow.
-    The conic answer is never a start: it is what this one is compared with.
+    The conic answer is never a start: it is what this one is compared with. None follows one that
+    ends at the bound.
+
+    Parameters
+    ----------
+    problem : to be solved.
+    bound : below which no objective can be.
+    seed : of the random starts.
     """
     posed = pose(problem)
-    found = [posed.program.solve([posed.start(x)]) for x in _first_starts(posed.problem)]
     random = np.random.default_rng(seed)
-    while len(found) < 2 + _RANDOM and not _agree(found):
-        found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
+    found: list[ProgramSolution] = []
+    for start in _starts(posed.problem, random):
+        found.append(posed.program.solve([posed.start(start)]))
+        if _is_at(found[-1], bound) or _agree(found):
+            break
     # Where the solver stopped early the point may still be the best one: so the certificate says.
     best = min(found, key=_rank)
     status = best.status.after(*(s.status for s in found if s is not best))
@@ -274,13 +283,20 @@ def _rank(found: ProgramSolution) -> tuple[bool, bool, float]:
     return not np.isfinite(found.objective), not found.violation <= TOLERANCE, found.objective
 
 
+def _is_at(found: ProgramSolution, bound: float) -> bool:
+    """Whether a start that succeeded ended at a bound: no other can end lower."""
+    near = np.isfinite(bound) and abs(found.objective - bound) <= _AGREE * abs(bound)
+    return bool(near) and not any(_rank(found)[:2])
+
+
 def _agree(found: list[ProgramSolution]) -> bool:
     """Whether the two best starts that succeeded ended at the same objective."""
     ends = sorted(s.objective for s in found if not any(_rank(s)[:2]))
     return len(ends) > 1 and ends[1] - ends[0] <= _AGREE * max(abs(ends[0]), 1e-300)
 
 
-def _first_starts(problem: Problem) -> list[np.ndarray]:
+def _starts(problem: Problem, random: np.random.Generator) -> Iterator[np.ndarray]:
+    """Standard parameters (s,) to begin with, the most promising first."""
     space = problem.space
     given, repaired = np.array(space.reference), np.array(problem.origin)
     for k, reference in enumerate(space.references):
@@ -291,7 +307,10 @@ def _first_starts(problem: Problem) -> list[np.ndarray]:
         nearest = nearest_body(repaired[part], length, consistency, float(reference[0]))
         repaired[part] = (1 - _INWARD) * nearest + _INWARD * reference
     given[space.rigid :] = problem.origin[space.rigid :]
-    return [given, repaired]
+    yield given
+    yield repaired
+    for _ in range(_RANDOM):
+        yield _random_start(problem, random)
 
 
 def _random_start(problem: Problem, random: np.random.Generator) -> np.ndarray:

@@ -76,6 +76,6 @@ class TorqueRipple(JointEffect):
         (k,) = self.shape
         if k.is_integer() and k <= _FEW and block.q.dtype == float:  # neither symbols nor far away
             z = block.circling(self.joint, int(k))
-            return np.stack([z.imag, z.real], axis=1)
+            return np.stack([np.imag(z), np.real(z)], axis=1)
         phase = k * block.q[:, [block.index(self.joint)]]
         return np.hstack([np.sin(phase), np.cos(phase)])

@@ -84,7 +84,7 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> C
         return CertifiedPoint(x, certify(problem, x, conic.status, "conic program", bound))
     from dynident.nlp.parametrised import solve_nonlinear
 
-    found = solve_nonlinear(problem)
+    found = solve_nonlinear(problem, bound.value)
     if not np.all(np.isfinite(found.x)) or not found.inside:
         _require(found.status, problem)
     x = _kept(problem, problem.retracted(found.x), stay)
