@@ -49,6 +49,24 @@ class Repeated:
         """Time from one instant to the next, s."""
         return float(np.median(np.diff(self.t, axis=1)))
 
+    @cached_property
+    def _known(self) -> dict[tuple[bytes, ContactCriteria], np.ndarray]:
+        return {}
+
+    def changes(self, kept: np.ndarray, criteria: ContactCriteria) -> np.ndarray:
+        """As `_changes`; of the latest instants known, for a look about a peak of another series.
+
+        Parameters
+        ----------
+        kept : (S,) instants that count.
+        criteria : of contacts.
+        """
+        key = kept.tobytes(), criteria
+        if key not in self._known:
+            self._known.clear()
+            self._known[key] = _changes(self, kept, criteria)
+        return self._known[key]
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Changes:
@@ -229,7 +247,7 @@ def changes_of(
     every = np.concatenate(certain)
     kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
     witnesses = np.concatenate(kept)[every]
-    changes = [_changes(s, ~out, own_criteria) for s, out in zip(series, left_out, strict=True)]
+    changes = [s.changes(~out, own_criteria) for s, out in zip(series, left_out, strict=True)]
     still = [np.ones(len(change)) for change in changes]
     # Noise follows the speed itself, or, once filtered, the least speed near by.
     for measure in (np.abs, _slowness):
