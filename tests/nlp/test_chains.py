@@ -9,6 +9,7 @@ from chains import chain_case, least
 from dynident.constraints import Consistency, Within
 from dynident.fitting.consistent.programs import solve
 from dynident.nlp.certificate import OPTIMAL
+from dynident.nlp.parametrised import solve_nonlinear
 
 # --- chains --------------------------------------------------------------------------------------
 
@@ -46,6 +47,17 @@ def test_the_nonlinear_program_reaches_the_bound(consistency, spread, flat, dist
         answer = solve(case.problem, "nlp")
         assert answer.certificate.gap <= OPTIMAL, seed
         assert answer.certificate.starts, "the starts tried are told"
+
+
+@pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
+def test_a_start_that_ends_at_the_bound_is_followed_by_none(consistency, spread, flat) -> None:
+    """Without a bound, or with one below the optimum, a second start has to agree."""
+    case = chain_case(7, 0, Within(consistency), "quadratic", spread=spread)
+    problem = case.problem.reduced()
+    proved = solve(problem, "nlp").certificate
+    assert proved.gap <= 1e-6 and len(proved.starts) == 1
+    for bound in (-np.inf, 0.9 * proved.bound):
+        assert len(solve_nonlinear(problem, bound).objectives) > 1
 
 
 @pytest.mark.parametrize("links", [10, pytest.param(30, marks=pytest.mark.slow)])
