@@ -30,7 +30,21 @@ def kernel(*columns: np.ndarray, width: float = 1.0) -> np.ndarray:
     columns : (T, k) each, in units of their spread.
     width : in these units.
     """
-    return np.exp(squareform(pdist(np.hstack(columns))) / -width)
+    return _of_pairs(_alike(*columns, width=width))
+
+
+def _alike(*columns: np.ndarray, width: float = 1.0) -> np.ndarray:
+    """Similarity of each pair of different rows, as `pdist` has them: half of what there is."""
+    distance = pdist(np.hstack(columns))
+    distance /= -width
+    return np.exp(distance, out=distance)
+
+
+def _of_pairs(similarity: np.ndarray) -> np.ndarray:
+    """The kernel (T, T) whose rows are alike by 1 to themselves, from that of each pair."""
+    found = squareform(similarity)
+    np.fill_diagonal(found, 1.0)
+    return found
 
 
 def centred(similarity: np.ndarray) -> np.ndarray:
@@ -41,21 +55,20 @@ def centred(similarity: np.ndarray) -> np.ndarray:
 
 def of_state(x: JointInputs) -> np.ndarray:
     """Kernel of functions of position and velocity of the joint."""
-    together = kernel(x.position, x.velocity, x.direction)
-    slow = kernel(x.velocity, x.direction, width=FINE)
-    return 0.25 * (1.0 + together + slow + kernel(x.position, width=FINE))
+    together = _alike(x.position, x.velocity, x.direction)
+    slow = _alike(x.velocity, x.direction, width=FINE)
+    return _of_pairs(0.25 * (1.0 + together + slow + _alike(x.position, width=FINE)))
 
 
 def of_acceleration(x: JointInputs) -> np.ndarray:
     """Kernel of what acceleration and load add, at any velocity."""
-    together = kernel(x.acceleration, x.load)
-    each = kernel(x.acceleration) + kernel(x.load)
-    return _at_any_state(x, (together + each) / 3.0)
+    every = (_alike(x.acceleration, x.load), _alike(x.acceleration), _alike(x.load))
+    return _at_any_state(x, _of_pairs(_mean(every)))
 
 
 def of_past(x: JointInputs) -> np.ndarray:
     """Kernel of what each of the inputs of the past adds, at any velocity."""
-    return _at_any_state(x, _mean([kernel(column[:, None]) for column in x.past.T]))
+    return _at_any_state(x, _of_pairs(_mean([_alike(column[:, None]) for column in x.past.T])))
 
 
 def of_speeds(x: JointInputs) -> np.ndarray:
@@ -63,7 +76,7 @@ def of_speeds(x: JointInputs) -> np.ndarray:
     others = [one[:, :1] for one in x.others]
     if not others:
         return np.zeros((len(x.time),) * 2)
-    together = _mean([kernel(x.velocity, one) for one in others])
+    together = _of_pairs(_mean([_alike(x.velocity, one) for one in others]))
     straight = _mean([one @ one.T for one in (x.velocity, *others)])
     return 0.5 * centred(together + straight**2)
 
@@ -79,8 +92,8 @@ def of_others(x: JointInputs) -> np.ndarray:
     found = []
     for one in x.others:
         velocity, direction, acceleration, position = np.split(one, [1, 2, 3], axis=1)
-        found += [kernel(position), kernel(velocity, direction), kernel(acceleration)]
-    return _at_any_state(x, _mean(found)) if found else np.zeros((len(x.time),) * 2)
+        found += [_alike(position), _alike(velocity, direction), _alike(acceleration)]
+    return _at_any_state(x, _of_pairs(_mean(found))) if found else np.zeros((len(x.time),) * 2)
 
 
 def of_time(x: JointInputs) -> np.ndarray:
@@ -93,8 +106,8 @@ def of_time(x: JointInputs) -> np.ndarray:
     return _at_any_state(x, 0.5 * (smooth + record))
 
 
-def _mean(kernels: Sequence[np.ndarray]) -> np.ndarray:
-    return sum(kernels[1:], kernels[0]) / len(kernels)
+def _mean(similarities: Sequence[np.ndarray]) -> np.ndarray:
+    return sum(similarities[1:], similarities[0]) / len(similarities)
 
 
 def _at_any_state(x: JointInputs, similarity: np.ndarray) -> np.ndarray:
@@ -124,7 +137,7 @@ def left_of_each_unit(
     FitError
         If the kernel is not positive definite beside noise.
     """
-    whole = np.array(similarity, order="F")
+    whole = similarity.T.copy(order="F")  # it is symmetric: as it lies in memory, for LAPACK
     whole[np.diag_indices_from(whole)] += 1.0
     factorised, inverted, solved = get_lapack_funcs(("potrf", "trtri", "posv"), (whole,))
     (product,) = get_blas_funcs(("trmv",), (whole,))
