@@ -118,15 +118,14 @@ class Block:
         A product of its powers of two, which are made once, for all that ask: several times as fast
         as sine and cosine.
         """
-        powers = self._circling.setdefault(joint, [])
-        if not powers:
-            powers.append(np.exp(1j * self.q[:, self.index(joint)]))
+        powers = self._circling.get(joint) or (np.exp(1j * self.q[:, self.index(joint)]),)
         while len(powers) < times.bit_length():
-            powers.append(powers[-1] ** 2)
+            powers = (*powers, powers[-1] ** 2)
+        self._circling[joint] = powers
         return reduce(mul, (one for k, one in enumerate(powers) if times >> k & 1))
 
     @cached_property
-    def _circling(self) -> dict[str | None, list[np.ndarray]]:
+    def _circling(self) -> dict[str | None, tuple[np.ndarray, ...]]:
         return {}
 
     @cached_property

@@ -136,7 +136,7 @@ class NoiseModel:
         if order == 0:
             return scaled
         every = scaled.reshape(-1, order + samples)
-        if every.size <= _AT_ONCE:
+        if 0 < every.size <= _AT_ONCE:
             white = self._correlated(every)
         else:
             white, some = np.empty((len(every), samples)), max(1, _AT_ONCE // max(1, samples))

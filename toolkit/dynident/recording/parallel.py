@@ -229,7 +229,7 @@ class ParallelFilter:
         rows = self.rows(len(xs[0])) if block is None else block.rows
         every = [np.asarray(x, dtype=float) for x in xs]
         if not self.stages:
-            return [np.ascontiguousarray(x[_as_slice(rows)]) for x in every]
+            return [x[_as_slice(rows)].copy() for x in every]
         out = [np.empty((len(rows), _width(x))) for x in every]
         self._filter(every, rows, out)
         return [y.reshape(len(rows), *x.shape[1:]) for x, y in zip(every, out, strict=True)]

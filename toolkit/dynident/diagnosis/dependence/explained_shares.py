@@ -42,7 +42,8 @@ FIRST = ((1.0, 0.1), (1.0, 1.0)), ((1.0, 10.0), (1.0, 100.0))
 NEXT = ((1.0, 0.1), (1.0, 1.0)), ((10.0, 1.0), (10.0, 10.0))
 """Factors on the strengths of earlier sets, and strengths of the first set and of others: variance
 of what a set predicts over that of what nothing does. The second ones are tried where with one of
-the first ones less is left: what predicts nothing predicts no more when it may vary more."""
+the first ones less is left, as it is by rough functions of what the residual depends on: what more
+variance of the earlier sets alone explains is not credited to the next one."""
 LEAST = 0.01
 """Share below which nothing is said: no law is sought for a hundredth of a residual."""
 LEVEL = 0.05

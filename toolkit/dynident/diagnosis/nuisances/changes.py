@@ -17,8 +17,9 @@ from scipy.special import stdtr, stdtrit
 from dynident.criteria import ContactCriteria, Criteria
 from dynident.effects import FRICTION_WIDTH
 from dynident.evidence.noise_model import SpeedClasses, measure_noise
-from dynident.moments.solution import orthonormal
 
+_DEPENDENT = 1e-8
+"""Size of a direction of the slow changes over the largest, below which it is none."""
 QUARTER = 0.6745
 """Median of the absolute value of a standard normal variable."""
 
@@ -50,7 +51,7 @@ class Repeated:
         return float(np.median(np.diff(self.t, axis=1)))
 
     @cached_property
-    def _known(self) -> dict[tuple[bytes, ContactCriteria], np.ndarray]:
+    def _latest(self) -> dict[str, tuple[tuple[bytes, ContactCriteria], np.ndarray]]:
         return {}
 
     def changes(self, kept: np.ndarray, criteria: ContactCriteria) -> np.ndarray:
@@ -61,11 +62,12 @@ class Repeated:
         kept : (S,) instants that count.
         criteria : of contacts.
         """
-        key = kept.tobytes(), criteria
-        if key not in self._known:
-            self._known.clear()
-            self._known[key] = _changes(self, kept, criteria)
-        return self._known[key]
+        of, found = self._latest.get("changes", (None, np.empty(0)))
+        if of != (asked := (kept.tobytes(), criteria)):
+            found = _changes(self, kept, criteria)
+            found.setflags(write=False)
+            self._latest["changes"] = asked, found
+        return found
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -289,15 +291,20 @@ def _changes(one: Repeated, kept: np.ndarray, criteria: ContactCriteria) -> np.n
     others = (one.residual.sum(axis=0) - one.residual) / (count - 1)
     found = one.residual - others
     for change, v in zip(found, one.speed, strict=True):
+        columns = _slow(v)
+        turned, size, _ = np.linalg.svd(columns, full_matrices=False)
         # Orthonormal, so that their products with weights lose no digits.
-        slow = np.ascontiguousarray(orthonormal(_slow(v), 1e-8).T)
+        slow = np.ascontiguousarray(turned[:, size > _DEPENDENT * size[0]].T)
         weight, rest = kept.astype(float), change
         for step in range(10):
             weighted = slow * weight
-            products = weighted @ slow.T
-            # Where hardly any instant counts, they may be singular.
-            products[np.diag_indices_from(products)] += 1e-14 * np.trace(products) + 1e-300
-            rest = change - np.linalg.solve(products, weighted @ change) @ slow
+            power, axes = np.linalg.eigh(weighted @ slow.T)
+            if power[0] > _DEPENDENT * power[-1]:
+                rest = change - axes @ ((axes.T @ (weighted @ change)) / power) @ slow
+            else:  # over the instants that count they depend on each other
+                root = np.sqrt(weight)
+                scaled = columns * root[:, None], change * root
+                rest = change - columns @ np.linalg.lstsq(*scaled, rcond=_DEPENDENT)[0]
             usual = 1.4826 * float(np.median(np.abs(rest[kept])))
             size = np.abs(rest) / max(usual, 1e-300)
             # Huber's weights find the bulk; Tukey's then forget what is far from it.

@@ -106,4 +106,5 @@ def _weights(count: int, draws: int, length: float) -> np.ndarray:
         begin = np.maximum.accumulate(np.where(begins, places, 0))
         rows = (starts[begin] + places - begin) % count
         weights[:] = np.bincount(rows, minlength=count) / count
+    found.setflags(write=False)
     return found

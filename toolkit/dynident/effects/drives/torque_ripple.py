@@ -74,7 +74,7 @@ class TorqueRipple(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         (k,) = self.shape
-        if k.is_integer() and k <= _FEW and block.q.dtype == float:  # neither symbols nor far away
+        if 1 <= k <= _FEW and k == int(k) and block.q.dtype == float:  # symbols have no powers
             z = block.circling(self.joint, int(k))
             return np.stack([np.imag(z), np.real(z)], axis=1)
         phase = k * block.q[:, [block.index(self.joint)]]

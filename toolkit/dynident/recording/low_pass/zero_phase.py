@@ -18,7 +18,9 @@ from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.low_pass.sections import state_at_rest
 
-_MOST_LANES = 8  # columns that are filtered together: wider vectors than the processor's are slow
+_LANES, _MOST_LANES = 4, 8
+"""Columns that are filtered together; eight where the processor has vectors as wide: others are
+slower than with four."""
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
 _LONG = np.dtype(ctypes.c_long)
 _SIZE, _PLACE = ctypes.c_long, ctypes.c_void_p
@@ -72,13 +74,13 @@ void {entry}(long samples, long padding, long columns, const double *sos, const 
 {{
     long c = 0;
 #ifdef __AVX512F__
-    for (; columns - c > 4; c += 8)
-        group8(samples, padding, columns - c < 8 ? columns - c : 8, sos, rest, x + c, down + c,
-            (lanes8 *)w, kept, rows, y + c, below + c);
+    for (; columns - c > {few}; c += {many})
+        group{many}(samples, padding, columns - c < {many} ? columns - c : {many}, sos, rest,
+            x + c, down + c, (lanes{many} *)w, kept, rows, y + c, below + c);
 #endif
-    for (; c < columns; c += 4)
-        group4(samples, padding, columns - c < 4 ? columns - c : 4, sos, rest, x + c, down + c,
-            (lanes4 *)w, kept, rows, y + c, below + c);
+    for (; c < columns; c += {few})
+        group{few}(samples, padding, columns - c < {few} ? columns - c : {few}, sos, rest,
+            x + c, down + c, (lanes{few} *)w, kept, rows, y + c, below + c);
 }}
 """
 
@@ -146,8 +148,12 @@ def zero_phase_columns(
     ------
     RecordingError
         If there are no more rows than the padding.
+    ValueError
+        If the parts are not of as many samples.
     """
     samples = len(parts[0].x)
+    if any(len(one.x) != samples for one in parts):  # compiled, it would read what is not theirs
+        raise ValueError("columns that are filtered together have as many samples")
     if samples <= padding:
         raise RecordingError(
             f"{samples} samples are too few to filter", where, f"at least {padding + 1} are needed"
@@ -166,9 +172,8 @@ def zero_phase_columns(
 @cache
 def _source(sections: int) -> str:
     """A filter of so many sections in C."""
-    return _SOURCE.format(
-        entry=_ENTRY, narrow=_group(4, sections), wide=_group(_MOST_LANES, sections)
-    )
+    few, many = (_group(lanes, sections) for lanes in (_LANES, _MOST_LANES))
+    return _SOURCE.format(entry=_ENTRY, few=_LANES, many=_MOST_LANES, narrow=few, wide=many)
 
 
 def _group(lanes: int, sections: int) -> str:
