@@ -37,11 +37,11 @@ def test_whole_numbers_of_ripples_are_those_of_sine_and_cosine() -> None:
     shared, robot = _block(q, still), arm()
     for k in (1.0, 2.0, 31.0, 47.0, 60.0, 63.0, 64.0, 2.5):
         (ripple,) = (one.shaped(k) for one in effects_of("torque_ripple@elbow", robot))
-        found = ripple.at_joint(shared)
+        found = ripple.acting_columns(shared)[:, 0]
         want = np.column_stack([np.sin(k * q[:, 1]), np.cos(k * q[:, 1])])
         # A digit of k q is one of its angle.
         np.testing.assert_allclose(found, want, atol=4 * np.finfo(float).eps * k * 30.0)
-        np.testing.assert_array_equal(ripple.at_joint(_block(q, still)), found)
+        np.testing.assert_array_equal(ripple.acting_columns(_block(q, still))[:, 0], found)
 
 
 def _block(q: np.ndarray, still: np.ndarray) -> Block:
