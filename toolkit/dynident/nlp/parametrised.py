@@ -258,6 +258,10 @@ def solve_nonlinear(problem: Problem, bound: float, seed: int = 0) -> NonlinearS
     problem : to be solved.
     bound : below which no objective can be.
     seed : of the random starts.
+
+    Returns
+    -------
+    The best of the starts that were tried, with what each of them reached.
     """
     posed = pose(problem)
     random = np.random.default_rng(seed)
