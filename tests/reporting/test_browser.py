@@ -75,12 +75,17 @@ def visit(browser) -> Callable[[Path, int], Visit]:
 
     def at(path: Path, width: int) -> Visit:
         if (path, width) not in visits:
-            visits[path, width] = opened(browser, path.as_uri(), width, Visit)
-            # Drawn in the order of the page, and all at once.
-            visits[path, width].page.locator(".js-plotly-plot").nth(2).wait_for()
+            visits[path, width] = _visited(browser, path, width)
         return visits[path, width]
 
     return at
+
+
+def _visited(browser, path: Path, width: int) -> Visit:
+    found = opened(browser, path.as_uri(), width, Visit)
+    # Drawn in the order of the page, and all at once.
+    found.page.locator(".js-plotly-plot").nth(2).wait_for()
+    return found
 
 
 def assert_readable(one: Visit) -> None:
@@ -208,6 +213,19 @@ def test_pictures_are_lower_on_paper_and_as_before_afterwards(visit, two_joints)
     )
 
 
+@pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
+def test_who_cannot_see_or_point_can_read_it(which, browser, request):
+    """With all that is folded open, less joints like others: of a page of its own."""
+    one = _visited(browser, request.getfixturevalue(which), DESK)
+    one.page.evaluate(_UNFOLD)
+    assert serious_faults(one.page) == []
+    levels = one.page.evaluate(
+        "[...document.querySelectorAll('h1,h2,h3,h4')].map((n) => Number(n.tagName[1]))"
+    )
+    assert levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))
+    one.page.context.close()
+
+
 def test_the_page_of_a_validation(visit, tmp_path):
     assert_readable(visit(report(validation(), tmp_path / "loop.html"), PHONE))
 
@@ -217,16 +235,3 @@ def test_hostile_names_stay_names(visit, tmp_path):
     one = visit(report(diagnosis(names, samples=300), tmp_path / "report.html"), DESK)
     assert_readable(one)
     assert one.page.locator("img").count() == 0
-
-
-@pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
-def test_who_cannot_see_or_point_can_read_it(which, visit, request):
-    """With all that is folded open, less joints like others."""
-    page = visit(request.getfixturevalue(which), DESK).page
-    page.locator("#final-only").set_checked(False)  # whatever a test before has chosen
-    page.evaluate(_UNFOLD)
-    assert serious_faults(page) == []
-    levels = page.evaluate(
-        "[...document.querySelectorAll('h1,h2,h3,h4')].map((n) => Number(n.tagName[1]))"
-    )
-    assert levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))

@@ -51,22 +51,22 @@ class Repeated:
         return float(np.median(np.diff(self.t, axis=1)))
 
     @cached_property
-    def _latest(self) -> dict[str, tuple[tuple[bytes, ContactCriteria], np.ndarray]]:
+    def _known(self) -> dict[tuple[bytes, ContactCriteria], np.ndarray]:
         return {}
 
     def changes(self, kept: np.ndarray, criteria: ContactCriteria) -> np.ndarray:
-        """As `_changes`; of the latest instants known, for a look about a peak of another series.
+        """As `_changes`, worked out once: looks about a peak leave the other series as they are.
 
         Parameters
         ----------
         kept : (S,) instants that count.
         criteria : of contacts.
         """
-        of, found = self._latest.get("changes", (None, np.empty(0)))
-        if of != (asked := (kept.tobytes(), criteria)):
-            found = _changes(self, kept, criteria)
+        asked = kept.tobytes(), criteria
+        found = self._known.get(asked)
+        if found is None:
+            found = self._known[asked] = _changes(self, kept, criteria)
             found.setflags(write=False)
-            self._latest["changes"] = asked, found
         return found
 
 
