@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from contextlib import suppress
 from types import MappingProxyType
 
-from dynident.diagnosis.search.path import judged_on
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
 from dynident.errors import FitError
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.held_out import on_blocks, on_recordings
 
 
 def candidate_gains(
@@ -31,8 +31,9 @@ def candidate_gains(
 ) -> dict[str, float]:
     """Return by how much the held-out error falls with each of the best candidates.
 
-    Everything is fitted anew with the candidate at the shape that the search found for it; the
-    widths of dry friction stay. Nothing is chosen by these figures.
+    Everything is fitted anew with the candidate at the shape that the search found for it, and the
+    noise is measured anew once; the widths of dry friction stay. Nothing is chosen by these
+    figures.
 
     Parameters
     ----------
@@ -69,8 +70,9 @@ def _error_with(
 ) -> float:
     """The held-out error with a candidate; FitError where it cannot be fitted with the model."""
     carrying = with_payload(evidence, one)
-    wider = fit_evidence(carrying, fitted.model + one.effect, fitted)
+    wider = fit_evidence(carrying, fitted.model + one.effect, fitted, noise_rounds=1)
     if not wider.settled:
         raise FitError("columns and values do not agree", one.effect.label)
-    decided = None if held is None else with_payload_decided(held, wider)
-    return judged_on(carrying, decided, wider).error
+    if held is None:
+        return on_blocks(carrying, wider).error
+    return on_recordings(with_payload_decided(held, wider), wider).error

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
-from operator import add
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import null_space
 
 from dynident.criteria import Criteria
 from dynident.effects import Effect
-from dynident.evidence.columns.joint_columns import JointColumns, WhiteColumns
+from dynident.evidence.columns.joint_columns import JointColumns
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import NoiseModel, flat_noise
-from dynident.evidence.runs import Run
-from dynident.evidence.time_varying import steady, time_varying_columns
+from dynident.evidence.time_varying import steady
+from dynident.evidence.white_moments import (
+    White,
+    moments_of,
+    pooled_moments_of,
+    systematic_squares,
+    whiten,
+    with_next,
+)
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicates import (
-    TimeVarying,
-    instrumental_values,
-    time_varying_products,
-    with_torque_again,
-)
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import (
     MomentSolution,
@@ -43,8 +42,9 @@ _FIRM = 1e3  # how much firmer a body's description is than that an effect is ze
 _ALONE = 1e-6
 """Square of a parameter's direction, of length 1, that what the data tell may leave out."""
 
-White = tuple[tuple[WhiteColumns, ...], ...]
-"""Whitened columns of each stack of runs, of each joint."""
+
+Columns = list[list[list[JointColumns]]]
+"""For each run, joint and replicate."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class EvidenceFit:
         """
         return float(np.sum(self.squares / over.variances))
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Whitened rows, over all repetitions and joints; noisy copies do not count."""
         return self.moments.count
@@ -139,7 +139,7 @@ class EvidenceFit:
             [steady(one.dense()) for one in joints] if joints[0].stack.kind == "repeated" else []
             for joints in self.white
         ]
-        summed = _with_next(self.white, parts)
+        summed = with_next(self.white, parts)
         pooled = summed.pooled()
         solution = regress(pooled, self.criteria.noise.reliable)
         values = _near_description(self.model, solution.values, pooled)
@@ -160,7 +160,13 @@ class EvidenceFit:
         return float(combination @ self.pooled.total @ combination)
 
 
-def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
+def fit_evidence(
+    evidence: Evidence,
+    model: Model,
+    near: EvidenceFit | None = None,
+    *,
+    noise_rounds: int | None = None,
+) -> EvidenceFit:
     """Fit a model to the runs of the evidence, and measure their noise.
 
     The instrumental variables are the other replicates of a run, see `dynident.moments`. Where
@@ -171,6 +177,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     evidence : recordings and their columns.
     model : with its effects and their shapes.
     near : the fit of a like model, from which columns that depend on the values start.
+    noise_rounds : after how many fits the noise is measured; as `FitCriteria` says if None.
 
     Returns
     -------
@@ -181,45 +188,39 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     FitError
         If the columns are not finite.
     """
-    n, criteria = model.robot.n, evidence.criteria.fit
+    criteria, reliable = evidence.criteria.fit, evidence.criteria.noise.reliable
     at = _held(model, _beginning(model, near))
     torque_std = _torque_rms(evidence)
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
-    known = any(run.kind != "single" for run in evidence.runs)
-    reliable = evidence.criteria.noise.reliable
+    noise_rounds = criteria.noise_rounds if noise_rounds is None else noise_rounds
     columns, values, settled, fixed_point = [], at, True, FixedPoint()
     white = None if near is None else near.white
-    for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
+    for round in range(criteria.value_rounds if model.needs_values else noise_rounds):
         if not columns or model.needs_values:
             model = model.at(at)
-            columns = [
-                [joint_columns(evidence, model, r, j, at) for j in range(n)]
-                for r in range(len(evidence.runs))
-            ]
-        white = _whiten(evidence, columns, noise, values, white)
-        pooled = _pooled(evidence, model, noise, white)
+            columns = _columns(evidence, model, at)
+        white = whiten(evidence, columns, noise, values, white)
+        pooled = pooled_moments_of(evidence, model, noise, white)
         values = regression_values(pooled, reliable)
         if model.needs_values:
             values = _near_description(model, values, pooled)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
-        noise = tuple(
-            _no_less(JointResidual.of(evidence, columns, values, j).noise, _LEAST * max(torque_std))
-            for j in range(n)
-        )
+        left = _left(evidence, columns, values)
+        noise = tuple(_no_less(one.noise, _LEAST * max(torque_std)) for one in left)
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         settled = bool(small) or not model.needs_values
-        enough = round >= criteria.noise_rounds - (near is not None)
+        enough = round >= noise_rounds - (near is not None)
         if enough and (small or fixed_point.stalls):
             break
         at = _held(model, fixed_point.following(model, at, values))
-    white = _whiten(evidence, columns, noise, values, white)
-    summed = _moments(evidence, model, noise, white)
+    white = whiten(evidence, columns, noise, values, white)
+    summed = moments_of(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)
     values = _near_description(model, solution.values, summed.pooled())
-    left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
+    left = _left(evidence, columns, values)
     return EvidenceFit(
         criteria=evidence.criteria,
         model=model.at(_held(model, values)),
@@ -227,10 +228,10 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         covariance=solution.covariance,
         solution=solution,
         noise=noise,
-        noise_known=known,
+        noise_known=any(run.kind != "single" for run in evidence.runs),
         white=white,
         moments=summed,
-        error_signal=_signal(evidence, white, values),
+        error_signal=float(systematic_squares(evidence, white, values).sum()),
         squares=np.array([one.square for one in left]),
         variances=np.array(
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
@@ -238,6 +239,19 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         torque_peaks=friction_reach(evidence, values),
         settled=settled,
     )
+
+
+def _columns(evidence: Evidence, model: Model, values: np.ndarray) -> Columns:
+    """Columns of a model and the torque."""
+    return [
+        [joint_columns(evidence, model, r, j, values) for j in range(model.robot.n)]
+        for r in range(len(evidence.runs))
+    ]
+
+
+def _left(evidence: Evidence, columns: Columns, values: np.ndarray) -> list[JointResidual]:
+    """What values (p,) leave at each joint."""
+    return [JointResidual.of(evidence, columns, values, j) for j in range(len(columns[0]))]
 
 
 def _torque_rms(evidence: Evidence) -> list[float]:
@@ -281,12 +295,9 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) ->
     other : the fit whose noise counts: of a wider model, or of a rival.
     """
     model, reliable = fitted.model, evidence.criteria.noise.reliable
-    columns = [
-        [joint_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
-        for r in range(len(evidence.runs))
-    ]
-    white = _whiten(evidence, columns, other.noise, fitted.values, fitted.white)
-    summed = _moments(evidence, model, other.noise, white)
+    columns = _columns(evidence, model, fitted.values)
+    white = whiten(evidence, columns, other.noise, fitted.values, fitted.white)
+    summed = moments_of(evidence, model, other.noise, white)
     solution = regress(summed.pooled(), reliable)
     values = _near_description(model, solution.values, summed.pooled())
     return replace(
@@ -297,7 +308,7 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) ->
         noise=other.noise,
         white=white,
         moments=summed,
-        error_signal=_signal(evidence, white, values),
+        error_signal=float(systematic_squares(evidence, white, values).sum()),
     )
 
 
@@ -383,108 +394,6 @@ def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.n
     return found
 
 
-def _whiten(evidence: Evidence, columns, noise, values, before: White | None = None) -> White:
-    """Whiten the columns; those that were whitened before, of whatever model, are known.
-
-    Parameters
-    ----------
-    evidence, columns : recordings, and their columns for each run, joint and replicate.
-    noise : of each joint.
-    values : (p,) the latest parameters.
-    before : of an earlier round, or of the fit of a like model.
-    """
-    found = []
-    for s, stack in enumerate(evidence.stacks):
-        here = []
-        for j, own in enumerate(noise):
-            known, signals = None, [columns[r][j] for r in stack.numbers]
-            if before is not None and s < len(before):
-                known = before[s][j].again(stack, own, signals)
-            if known is None:
-                pairs = zip(stack.runs, signals, strict=True)
-                moved = [_moved(run, one, values) for run, one in pairs]
-                known = WhiteColumns.of(stack, j, own, moved)
-            here.append(known)
-        found.append(tuple(here))
-    return tuple(found)
-
-
-def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Sequence[JointColumns]:
-    """Move the torque from the measured to the simulated motion, where there is one.
-
-    Instrumental variables V' (y - W x) = 0, with columns W along the measured motion and V along
-    the simulated one, are not symmetric. They are the least squares of y - (W - V) x on V, taken at
-    the x that they find. So the simulated replicate's torque becomes that at the latest x, and
-    everything that follows is plain regression on columns without noise (but for responses behind
-    springs and gaps, see `Evidence.responses`). What another column would bring is then its
-    instrumental moment with the residual y - W x: zero in the mean if nothing is missing, wherever
-    the simulated motion may lie.
-
-    Parameters
-    ----------
-    run : the recording.
-    signals : columns of the model and the torque at a joint, for each replicate.
-    values : (p,) the latest parameters.
-    """
-    if run.columns_from == "recording":
-        return signals
-    measured, simulated = signals[0], signals[-1]
-    torque = measured.times(np.append(-values, 1.0)) + simulated.times(np.append(values, 0.0))
-    return [*signals[:-1], simulated.with_torque(torque)]
-
-
-def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
-    if model.is_time_varying:
-        return _of_the_session(evidence, model, noise, white)
-    return SecondMoments.stacked([WhiteColumns.moments(joints) for joints in white])
-
-
-def _of_the_session(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
-    """Moments of a model of which some columns depend on the time, see `_with_next`."""
-    parts = [
-        [
-            time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
-            for j, w in enumerate(joints)
-        ]
-        if stack.kind == "repeated"
-        else []
-        for stack, joints in zip(evidence.stacks, white, strict=True)
-    ]
-    return _with_next(white, parts)
-
-
-def _with_next(white: White, parts: Sequence[Sequence[TimeVarying]]) -> SecondMoments:
-    """Moments with the next repetition as the instrument of each; of other recordings, as ever.
-
-    Products of all repetitions tell the same in the mean. But of a column that hardly changes with
-    the time, beside its like that does not, the difference of two estimates would be all there is.
-
-    Parameters
-    ----------
-    white : columns and the torque of each stack of runs, of each joint.
-    parts : the same with their instruments; nothing for a stack that does not repeat.
-    """
-    values, found = None, []
-    for joints, own in zip(white, parts, strict=True):
-        here, edges = WhiteColumns.moments(joints), joints[0].stack.runs[0].edges
-        if own:
-            if values is None:
-                values = instrumental_values([one for part in parts for one in part])
-            about = (one.about(values) for one in own)
-            products = np.sum([time_varying_products(x, x, edges) for x in about], axis=0)
-            half = with_torque_again(products, values).swapaxes(1, 2)
-            here = here.with_signal(with_torque_again(half, values).swapaxes(1, 2))
-        found.append(here)
-    return SecondMoments.stacked(found)
-
-
-def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
-    """The moments of all blocks together, in less time where nothing depends on the time."""
-    if model.is_time_varying:
-        return _moments(evidence, model, noise, white).pooled()
-    return reduce(add, (WhiteColumns.pooled(joints) for joints in white))
-
-
 def signal_by_joint(evidence: Evidence, fitted: EvidenceFit) -> np.ndarray:
     """Return the parts of `error_signal` that are left at each joint, (n,).
 
@@ -492,19 +401,4 @@ def signal_by_joint(evidence: Evidence, fitted: EvidenceFit) -> np.ndarray:
     ----------
     evidence, fitted : the recordings, and the model as it fits them.
     """
-    return _signals(evidence, fitted.white, fitted.values)
-
-
-def _signal(evidence: Evidence, white: White, values: np.ndarray) -> float:
-    """Squared whitened residual, of what the replicates have in common."""
-    return float(_signals(evidence, white, values).sum())
-
-
-def _signals(evidence: Evidence, white: White, values: np.ndarray) -> np.ndarray:
-    """The same of each joint, (n,)."""
-    combination, found = np.append(-values, 1.0), np.zeros(len(white[0]))
-    for stack, joints in zip(evidence.stacks, white, strict=True):
-        for j, one in enumerate(joints):
-            left = one.times(combination)
-            found[j] += stack.moments(left, left).signal.sum()
-    return found
+    return systematic_squares(evidence, fitted.white, fitted.values)

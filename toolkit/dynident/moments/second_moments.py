@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 
 import numpy as np
@@ -164,6 +164,10 @@ class SecondMoments:
 
     def pooled(self) -> SecondMoments:
         """Return the moments of the rows of all blocks together."""
+        return self._pooled
+
+    @cached_property
+    def _pooled(self) -> SecondMoments:
         return self._with(lambda products: products.sum(axis=0), self.count)
 
     def without_each(self) -> Iterator[SecondMoments]:

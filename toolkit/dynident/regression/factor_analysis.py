@@ -191,11 +191,10 @@ class Posterior:
         Gd, b, kappa, ct, e = self.Gd, self.b, self.kappa, self.ct, self.e
         var_z = self.g - self.g**2 / (f.py + self.s)
         xz = b * Gd + kappa * self.v
-        zz_mean = b**2 * Gd + 2 * b * kappa * self.v + kappa**2 * self.R
-        zz = zz_mean + N * var_z
+        zz = b * xz + kappa * (b * self.v + kappa * self.R) + N * var_z
         xt = ct * Gd + e * xz
-        zt = ct * xz + e * zz_mean + N * e * var_z
-        tt = ct**2 * Gd + 2 * ct * e * xz + e**2 * zz_mean + N * (1 / self.a + e**2 * var_z)
+        zt = ct * xz + e * zz
+        tt = ct * xt + e * zt + N / self.a
 
         wz_var, wx_var = 1 / (tt / f.pz + f.relevance), 1 / (tt / f.px + f.relevance)
         wz, wx = wz_var * zt / f.pz, wx_var * xt / f.px

@@ -129,15 +129,8 @@ def _is_one_more_law(effect: Effect, model: Model) -> bool:
 def _laws_at(
     evidence: Evidence, fitted: EvidenceFit, joints: list[str], least: float
 ) -> list[ReversalLaw]:
-    """Laws at joints that explain something; fewer where all of them are too little by far.
-
-    What a law explains is estimated from what is left at its joint, whose noise-free square is
-    known to the noise of a sum of so many squares.
-    """
-    names, worth = fitted.model.robot.names, 2.0 * np.log(fitted.rows)
-    noise = _NOISE * np.sqrt(2.0 * fitted.rows / len(names))
-    left = _AT_MOST * (np.clip(signal_by_joint(evidence, fitted), 0.0, None) + noise)
-    most = dict(zip(names, left, strict=True))
+    """Laws at joints that explain something; fewer where all of them are too little by far."""
+    worth, most = 2.0 * np.log(fitted.rows), _at_most(evidence, fitted)
     found: dict[str, ReversalLaw] = {}
     waiting = sorted(joints, key=lambda one: -most[one])
     while waiting:
@@ -150,6 +143,18 @@ def _laws_at(
         if law.drop > worth and abs(law.lead_s) < LATEST:
             found[joint] = law
     return [found[joint] for joint in joints if joint in found]
+
+
+def _at_most(evidence: Evidence, fitted: EvidenceFit) -> dict[str, float]:
+    """What a law at each joint may explain, squared residual, whitened.
+
+    Estimated from what is left there, whose noise-free square is known to the noise of a sum of so
+    many squares.
+    """
+    names = fitted.model.robot.names
+    noise = _NOISE * np.sqrt(2.0 * fitted.rows / len(names))
+    left = _AT_MOST * (np.clip(signal_by_joint(evidence, fitted), 0.0, None) + noise)
+    return dict(zip(names, left.tolist(), strict=True))
 
 
 def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalLaw, ...]:
@@ -172,9 +177,9 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     least = evidence.criteria.gates.later_share * fitted.error_total
     if fitted.error_signal < least:
         return ()
-    quiet = joints_below_noise(evidence, fitted)
-    dry = (joint for joint in dry_joints(fitted.model) if joint not in quiet)
-    every = (_best_law(evidence, fitted, joint) for joint in dry)
+    quiet, most = joints_below_noise(evidence, fitted), _at_most(evidence, fitted)
+    dry = (one for one in dry_joints(fitted.model) if one not in quiet and most[one] >= least)
+    every = (_best_law(evidence, fitted, one, least - _BETWEEN * most[one]) for one in dry)
     return tuple(law for law in every if law.drop >= least and not law.lags and law.lead_s < LATEST)
 
 

@@ -222,8 +222,10 @@ def judged_on(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> 
     """
     if held is None:
         return on_blocks(evidence, stage)
-    noise = evidence.criteria.noise
-    return with_noise_of(on_recordings(held, stage), on_recordings(evidence, stage), noise)
+    judged = on_recordings(held, stage)
+    if judged.noise_std is not None or not stage.noise_known:
+        return judged
+    return with_noise_of(judged, on_recordings(evidence, stage), evidence.criteria.noise)
 
 
 def responses_in_place(

@@ -263,8 +263,7 @@ def price(
     -------
     Squared, whitened residual.
     """
-    shapes = len(effect.shape_parameters(fitted.model.robot))
-    return (rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
+    return (rank + len(effect.shape)) * np.log(fitted.rows) + 2.0 * np.log(grid)
 
 
 def _seen(effect: Effect, fitted: EvidenceFit, scale: np.ndarray) -> np.ndarray:

@@ -76,7 +76,15 @@ def amended(
     refused: set[str] = set()
     for _ in range(_ROUNDS):
         recordings = read(reading)
-        guesses = [guess(reading, recordings) for guess in (_zeros, _mounting, _wiring, _coupling)]
+        rows = reading.rows(recordings)
+        if rows is None:
+            break
+        guesses = [
+            _zeros(reading, rows),
+            _mounting(reading, rows),
+            _wiring(reading, rows, recordings[0]),
+            _coupling(reading, rows),
+        ]
         found = [one for one in guesses if one is not None and one.subject not in refused]
         if not found:
             break
@@ -96,11 +104,8 @@ def amended(
     return reading
 
 
-def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+def _mounting(reading: Reading, rows: WiringRows) -> Amendment | None:
     """A base that is mounted otherwise than the description says, or torques without gravity."""
-    rows = reading.rows(recordings)
-    if rows is None:
-        return None
     robot = reading.robot
     found = mounting(Model(robot), rows, Assignment.as_recorded(robot.n), DEFAULTS.wiring)
     if found is None or found.turn < DEFAULTS.wiring.least_turn or not found.suits(found.after):
@@ -114,11 +119,8 @@ def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment 
     )
 
 
-def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+def _zeros(reading: Reading, rows: WiringRows) -> Amendment | None:
     """Joints that count from a quarter turn elsewhere."""
-    rows = reading.rows(recordings)
-    if rows is None:
-        return None
     robot = reading.robot
     guess = guess_zeros(robot, rows, _fit, reading.torque_unit)
     if not any(guess.quarters):
@@ -150,12 +152,9 @@ def _ratios_to_give(reading: Reading) -> str:
     return f"{given}; where the motor of {names[-2]} turns {column} too, also --column {together}"
 
 
-def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+def _wiring(reading: Reading, rows: WiringRows, first: Recording) -> Amendment | None:
     """Units, gears, signs and order of columns."""
-    rows = reading.rows(recordings)
-    if rows is None:
-        return None
-    guess = guess_wiring(reading, rows, recordings[0])
+    guess = guess_wiring(reading, rows, first)
     if guess is None:
         return None
     if guess.unknown_gears:
@@ -163,7 +162,7 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
             f"positions of {', '.join(guess.unknown_gears)} are on the motor side of gears, whose "
             "ratios the data do not tell"
         )
-        raise RecordingError(what, recordings[0].where, _ratios_to_give(reading))
+        raise RecordingError(what, first.where, _ratios_to_give(reading))
     return Amendment(
         subject="units and signs",
         what="; ".join(guess.findings),
@@ -178,11 +177,10 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
     )
 
 
-def _coupling(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+def _coupling(reading: Reading, rows: WiringRows) -> Amendment | None:
     """A motor that turns two joints, where the torques tell."""
-    rows = reading.rows(recordings) if reading.may_share_motors else None
-    guess = None if rows is None else coupling_by_torques(reading.robot, rows)
-    if rows is None or guess is None:
+    guess = coupling_by_torques(reading.robot, rows) if reading.may_share_motors else None
+    if guess is None:
         return None
     (one,) = guess.found
     after = shared(reading, one)

@@ -9,6 +9,7 @@ offset, so that what a model lacks is not taken for a fault of the wiring.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -144,15 +145,19 @@ class WiringRegression:
         n = len(order)
         cross = self.cross[np.arange(n), order] * scale[:, None]
         power = np.maximum(self.power[np.arange(n), order] * scale**2, 1e-300)
-        left = power
+        left, columns = power, self.gram.shape[1]
         for _ in range(_ROUNDS):
             weight = 1.0 / np.maximum(left, _LEAST * power)
-            A = (weight @ self.gram.reshape(n, -1)).reshape(len(self.gram[0]), -1)
+            A = (weight @ self.gram.reshape(n, -1)).reshape(columns, columns)
+            diagonal = A.diagonal()
             # A column of zeros, of a joint at rest, is known by the ridge alone.
-            size = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
-            factor = _cholesky(A / np.outer(size, size) + _RIDGE * np.eye(len(A)))
+            size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+            A /= size
+            A /= size[:, None]
+            A.flat[:: columns + 1] += _RIDGE
+            factor = _cholesky(A)
             values = _solved(factor, (weight @ cross) / size) / size
-            quadratic = (self.gram @ values) @ values
+            quadratic = (self.gram.reshape(-1, columns) @ values).reshape(n, columns) @ values
             left = np.maximum(power - 2 * cross @ values + quadratic, 0.0)
         wanted = np.concatenate([self.inertia_of, self.friction_of])
         spread = np.sqrt(np.sum((wanted / size) * _solved(factor, (wanted / size).T).T, axis=1))
@@ -198,7 +203,8 @@ def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
 def _cholesky(A: np.ndarray) -> np.ndarray:
     """The factor of a matrix so small that SciPy's own functions would take longer than it does."""
     factor, failed = _potrf(A, lower=0, clean=0)
-    if failed or not np.isfinite(factor[-1:, -1:]).all():  # LAPACK lets what is not finite pass
+    last = float(factor[-1, -1]) if len(factor) else 1.0
+    if failed or not isfinite(last):  # LAPACK lets what is not finite pass
         raise np.linalg.LinAlgError("the moments of the wiring are not positive definite")
     return factor
 
