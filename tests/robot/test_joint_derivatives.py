@@ -17,7 +17,7 @@ def test_a_joints_derivatives_are_columns_of_all(samples, most, monkeypatch) -> 
     motion = robot.random_motion(0, samples)
     found = JointDerivatives(robot, *motion)
     written = robot.torque_derivatives_by(0, *motion) is not None
-    assert written == (samples >= dynamics._MANY_DERIVED and most > 3)
+    assert written == (samples >= dynamics._MANY and most > 3)
     # Of so few samples through Pinocchio.
     parts = [
         robot.torque_derivatives(*part)
@@ -39,7 +39,7 @@ def test_derivatives_by_all_joints_are_those_of_few_samples(seed, monkeypatch) -
     bodies = random_tree(seed, moving=3)
     order = np.random.default_rng(seed).permutation(joint_names(bodies))
     robot = Robot.from_text(urdf(bodies), joints=list(order))
-    motion = robot.random_motion(seed, dynamics._MANY_DERIVED)
+    motion = robot.random_motion(seed, dynamics._MANY)
     asked, kernel = [], dynamics.torque_derivative_kernel
     monkeypatch.setattr(
         dynamics,

@@ -26,14 +26,11 @@ from dynident.robot.tree import Array, Joint
 # Slow to load, and not needed to read or check a description; the bindings carry no types.
 pin: Any = LateModule("pinocchio")
 
-# Samples of one call for which a function of many samples pays. Measured: of 500 it takes 0.1 ms
-# (2 joints) and 0.8 ms (7) where Pinocchio takes 0.7 and 2; making it, once a robot and gravity,
-# takes as long as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, and whoever
-# asks for a recording asks again and again. Few rows under many gravities, as a check of the wiring
-# has them, are no recording. Not by what was asked before: the last digits would be.
-_MANY = 500
-# The same of derivatives, whose functions take longer to make.
-_MANY_DERIVED = 1000
+# Samples of one call for which a function of many samples pays. Measured: making it takes as long
+# as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once a robot, and whoever
+# asks for a recording asks again and again; below, a plain fit is done before CasADi is loaded. Not
+# by what was asked before: the last digits would be.
+_MANY = 1000
 # Joints up to which derivatives by one joint's motion are written out. Measured: for 2, 7 and 12 of
 # them that takes 0.1, 0.05 and 0.1 s a joint, and a sample 0.2, 1.3 and 3 us where Pinocchio, which
 # knows only those by all joints, takes 4, 12 and 45.
@@ -210,7 +207,7 @@ class Dynamics:
             As in `Robot.regressor`.
         """
         wanted = tuple(range(10 * self.n) if columns is None else columns)
-        if len(q) >= _MANY:
+        if self._is_many(q):
             return regressor_kernel(self.tree, wanted)(q, v, a, out=out)
         Y = self._evaluate(
             self._workspace(), pin.computeJointTorqueRegressor, (q, v, a), (self.n, 10 * self.n)
@@ -234,7 +231,7 @@ class Dynamics:
         phi = theta.reshape(self.n, 10)
         if not np.all(np.isfinite(phi)):
             return np.full(q.shape, np.nan)
-        if len(q) >= _MANY:
+        if self._is_many(q):
             return torque_kernel(self.tree)(q, v, a, parameters=theta.tolist())
         space = self._workspace()
         space.hold(phi)
@@ -258,7 +255,7 @@ class Dynamics:
         theta : (10 n,) ndarray
             As in `Robot.torque_derivatives`.
         """
-        if len(q) >= _MANY_DERIVED and self.n <= _FEWEST_JOINTS:
+        if self._is_many(q) and self.n <= _FEWEST_JOINTS:
             each = [self._by_joint(joint, q, v, a, theta) for joint in range(self.n)]
             return TorqueDerivatives(*np.stack(each, axis=-1).swapaxes(0, 1))
         space = self._workspace()
@@ -285,7 +282,7 @@ class Dynamics:
         -------
         (T, n) each; None of few samples or many joints, where `derivatives` are had for as much.
         """
-        if len(q) < _MANY_DERIVED or self.n > _FEW_JOINTS:
+        if not self._is_many(q) or self.n > _FEW_JOINTS:
             return None
         found = self._by_joint(joint, q, v, a, theta)
         return TorqueDerivatives(found[:, 0], found[:, 1], found[:, 2])
@@ -293,6 +290,10 @@ class Dynamics:
     def _by_joint(self, joint: int, q: Array, v: Array, a: Array, theta: Array) -> Array:
         """Return the derivatives by one joint's q, v and a, (T, 3, n)."""
         return torque_derivative_kernel(self.tree, joint)(q, v, a, parameters=theta.tolist())
+
+    def _is_many(self, q: Array) -> bool:
+        """Whether a function of many samples pays."""
+        return len(q) >= _MANY
 
 
 def _keeps_digits(phi: Array) -> bool:
