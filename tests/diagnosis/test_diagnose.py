@@ -300,7 +300,7 @@ def test_the_gain_of_a_candidate_is_the_fall_of_the_step_that_adds_it_alone() ->
     found = diagnosed(model, "joint_spring@elbow", {"k__elbow": 2.5, "c__elbow": -0.4})
     (step,) = found.steps
     (one,) = [c for c in found.candidates if c.effect.label == step.effect.label]
-    assert one.test_gain == pytest.approx(step.fall, rel=0.01)
+    assert one.test_gain == pytest.approx(step.fall, rel=1e-9)
     assert found.to_dict()["candidates"][0]["test_gain"] == one.test_gain
     error = step.fall_standard_error
     assert error is not None and 0.0 < error < 0.5 * step.fall and not step.uncertain

@@ -211,10 +211,27 @@ def _gains(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """What candidates take off the errors of the model as given, and of the final one."""
     evidence, rounds, stages = search.evidence, search.rounds, search.path.stages
-    first = candidate_gains(rounds[0], evidence, held, stages[0], before, _SHOWN)
+    known = _of_the_first_step(search)
+    first = candidate_gains(rounds[0], evidence, held, stages[0], before, _SHOWN, known=known)
     known = first if len(rounds) == len(stages) == 1 else {}  # asked of the same fit
     last = candidate_gains(rounds[-1], evidence, held, stages[-1], after, 0, known=known)
     return first, last
+
+
+def _of_the_first_step(search: Search) -> dict[str, float]:
+    """What the first step takes off, where it adds no more than the candidate that was ranked."""
+    path = search.path
+    if not path.found:
+        return {}
+    label, (start, after, *_) = path.found[0].score.effect.label, path.stages
+    ranked = next((one for one in search.rounds[0].scores if one.effect.label == label), None)
+    same_widths = np.array_equal(start.model.friction_widths, after.model.friction_widths)
+    if ranked is None or not same_widths or ranked.effect.is_dynamic_response:
+        return {}
+    if after.model.effect(label).shape != ranked.effect.shape:
+        return {}
+    before, error = (one.error for one in path.judged[:2])
+    return {label: before - error}
 
 
 def _differing_recordings(

@@ -31,9 +31,9 @@ def candidate_gains(
 ) -> dict[str, float]:
     """Return by how much the held-out error falls with each of the best candidates.
 
-    Everything is fitted anew with the candidate at the shape that the search found for it, and the
-    noise is measured anew once; the widths of dry friction stay. Nothing is chosen by these
-    figures.
+    Everything is fitted anew with the candidate at the shape that the search found for it, where
+    only columns that depend on the values have the noise measured anew more than once; the widths
+    of dry friction stay. Nothing is chosen by these figures.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from scipy import special
 
 from dynident.diagnosis.details import place
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scoring import Score, price
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -130,12 +130,9 @@ def _deviations_to_pass(one: Score, fitted: EvidenceFit, tests: int) -> float:
         # Of the test that takes blocks of time as its sampling units, corrected for all tests.
         quantile = float(special.fdtri(rank, blocks - rank, 1.0 - gates.level / max(tests, 1)))
         wald = quantile * rank * (blocks - 1) / (blocks - rank)
-    shapes = len(one.effect.shape_parameters(robot))
-    price = (rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(
-        len(tuple(one.effect.variants(robot)))
-    )
+    worth = float(price(fitted, one.effect, rank, len(tuple(one.effect.variants(robot)))))
     share = max(gates.first_share, gates.least_gain)
-    least = max(wald, price, share / (1.0 - share) * fitted.error_total)
+    least = max(wald, worth, share / (1.0 - share) * fitted.error_total)
     return float(np.sqrt(least) + special.ndtri(POWER))
 
 

@@ -177,7 +177,7 @@ def fit_evidence(
     evidence : recordings and their columns.
     model : with its effects and their shapes.
     near : the fit of a like model, from which columns that depend on the values start.
-    noise_rounds : after how many fits the noise is measured; as `FitCriteria` says if None.
+    noise_rounds : fits at least, with the noise measured after each; as `FitCriteria` if None.
 
     Returns
     -------

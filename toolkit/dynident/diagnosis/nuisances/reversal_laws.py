@@ -178,7 +178,7 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     if fitted.error_signal < least:
         return ()
     quiet, most = joints_below_noise(evidence, fitted), _at_most(evidence, fitted)
-    dry = (one for one in dry_joints(fitted.model) if one not in quiet and most[one] >= least)
+    dry = (joint for joint in dry_joints(fitted.model) if joint not in quiet)
     every = (_best_law(evidence, fitted, one, least - _BETWEEN * most[one]) for one in dry)
     return tuple(law for law in every if law.drop >= least and not law.lags and law.lead_s < LATEST)
 
