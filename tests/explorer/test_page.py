@@ -223,7 +223,7 @@ def test_it_is_readable_and_reached_by_keys(small, tab, width):
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
-def test_axe_finds_nothingserious_faults(small, tab, width):
+def test_axe_finds_no_serious_faults(small, tab, width):
     """As it is opened, with all that is folded open, and with an effect switched on."""
     page = tab(small[1].url, width).page
     # No style of the page lets its colours follow the width.
