@@ -16,7 +16,7 @@ from dynident.diagnosis.search.scoring import Score
 from dynident.errors import FitError
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_blocks, on_recordings
+from dynident.evidence.held_out import on_held_out
 
 
 def candidate_gains(
@@ -73,6 +73,5 @@ def _error_with(
     wider = fit_evidence(carrying, fitted.model + one.effect, fitted, noise_rounds=1)
     if not wider.settled:
         raise FitError("columns and values do not agree", one.effect.label)
-    if held is None:
-        return on_blocks(carrying, wider).error
-    return on_recordings(with_payload_decided(held, wider), wider).error
+    decided = None if held is None else with_payload_decided(held, wider)
+    return on_held_out(carrying, decided, wider).error

@@ -10,13 +10,13 @@ from scipy.linalg import null_space
 
 from dynident.criteria import Criteria
 from dynident.effects import Effect
-from dynident.evidence.columns.joint_columns import JointColumns
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import NoiseModel, flat_noise
 from dynident.evidence.time_varying import steady
 from dynident.evidence.white_moments import (
+    ColumnsOfRuns,
     White,
     moments_of,
     pooled_moments_of,
@@ -41,10 +41,6 @@ _LEAST = 1e-13
 _FIRM = 1e3  # how much firmer a body's description is than that an effect is zero
 _ALONE = 1e-6
 """Square of a parameter's direction, of length 1, that what the data tell may leave out."""
-
-
-Columns = list[list[list[JointColumns]]]
-"""For each run, joint and replicate."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,7 +237,7 @@ def fit_evidence(
     )
 
 
-def _columns(evidence: Evidence, model: Model, values: np.ndarray) -> Columns:
+def _columns(evidence: Evidence, model: Model, values: np.ndarray) -> ColumnsOfRuns:
     """Columns of a model and the torque."""
     return [
         [joint_columns(evidence, model, r, j, values) for j in range(model.robot.n)]
@@ -249,7 +245,7 @@ def _columns(evidence: Evidence, model: Model, values: np.ndarray) -> Columns:
     ]
 
 
-def _left(evidence: Evidence, columns: Columns, values: np.ndarray) -> list[JointResidual]:
+def _left(evidence: Evidence, columns: ColumnsOfRuns, values: np.ndarray) -> list[JointResidual]:
     """What values (p,) leave at each joint."""
     return [JointResidual.of(evidence, columns, values, j) for j in range(len(columns[0]))]
 

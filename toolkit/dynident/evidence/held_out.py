@@ -176,6 +176,21 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     return replace(judged, what="blocks of time")
 
 
+def on_held_out(evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> HeldOut:
+    """Judge a model on test recordings; on blocks of the training recordings without any.
+
+    Parameters
+    ----------
+    evidence, held : of the training and of the test recordings.
+    fitted : the model.
+
+    Returns
+    -------
+    With the noise that these recordings tell themselves.
+    """
+    return on_blocks(evidence, fitted) if held is None else on_recordings(held, fitted)
+
+
 def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> HeldOut:
     """Judge recordings that do not tell their own noise by the noise measured on others.
 

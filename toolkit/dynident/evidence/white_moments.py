@@ -22,13 +22,16 @@ from dynident.moments.replicates import (
 )
 from dynident.moments.second_moments import SecondMoments
 
+ColumnsOfRuns = Sequence[Sequence[Sequence[JointColumns]]]
+"""Columns of a model and the torque, for each run, joint and replicate."""
+
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each stack of runs, of each joint."""
 
 
 def whiten(
     evidence: Evidence,
-    columns: Sequence[Sequence[Sequence[JointColumns]]],
+    columns: ColumnsOfRuns,
     noise: Sequence[NoiseModel],
     values: np.ndarray,
     before: White | None = None,

@@ -30,7 +30,7 @@ from dynident.diagnosis.search.selection import AddedEffect
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
+from dynident.evidence.held_out import HeldOut, on_held_out, on_recordings, with_noise_of
 from dynident.tables import two_percent
 
 _Group = tuple[AddedEffect, ...]
@@ -220,10 +220,8 @@ def judged_on(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> 
     evidence, held : of the training and of the test recordings.
     stage : the fit.
     """
-    if held is None:
-        return on_blocks(evidence, stage)
-    judged = on_recordings(held, stage)
-    if judged.noise_std is not None or not stage.noise_known:
+    judged = on_held_out(evidence, held, stage)
+    if held is None or judged.noise_std is not None or not stage.noise_known:
         return judged
     return with_noise_of(judged, on_recordings(evidence, stage), evidence.criteria.noise)
 
