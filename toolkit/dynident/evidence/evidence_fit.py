@@ -205,13 +205,15 @@ def fit_evidence(
             values = _keeping_dependent(model, at, values)
         left = _left(evidence, columns, values)
         noise = tuple(_no_less(one.noise, _LEAST * max(torque_std)) for one in left)
-        change = float(np.linalg.norm(_held(model, values) - at))
+        found = _held(model, values)
+        change = float(np.linalg.norm(found - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         settled = bool(small) or not model.needs_values
         enough = round >= noise_rounds - (near is not None)
         if enough and (small or fixed_point.stalls):
             break
-        at = _held(model, fixed_point.following(model, at, values))
+        # What is held moves nothing: its distance to the value found would seem to be a swing.
+        at = fixed_point.following(model, at, found)
     white = whiten(evidence, columns, noise, values, white)
     summed = moments_of(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)

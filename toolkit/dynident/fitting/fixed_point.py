@@ -6,8 +6,9 @@ import numpy as np
 
 from dynident.model import Model
 
-_SHRUNK = 0.9
-"""Share of the change before which a change has to stay below, or the next step is shorter."""
+_FAST = 0.5
+"""Share of the change before which a change has to stay below, or the next step has another
+length."""
 _SHORTEST = 0.1
 _NEAR = 1e-2
 """Relative change of the values below which they are near their end."""
@@ -19,11 +20,14 @@ of what it was."""
 class FixedPoint:
     """Where the columns are taken next, with shorter steps while the values swing.
 
-    A step that does not shrink the change overshoots: a half of it does.
+    Where the last two changes are not small beside each other, the share of the next step is that
+    at which, were values and changes on one line, the change would be zero (Irons and Tuck, A
+    version of the Aitken accelerator for computer iteration, International Journal for Numerical
+    Methods in Engineering, 1969). No step is longer than the plain one.
     """
 
     def __init__(self) -> None:
-        self._share, self._change = 1.0, np.inf
+        self._share, self._step = 1.0, np.zeros(0)
         self._relative: list[float] = []
 
     @property
@@ -52,11 +56,15 @@ class FixedPoint:
         -------
         (p,)
         """
-        step = model.relaxed(at, found) - at
+        step, before = model.relaxed(at, found) - at, self._step
         change = float(np.linalg.norm(step))
-        if change > _SHRUNK * self._change:
-            self._share = max(self._share / 2, _SHORTEST)
-        self._change = change
+        if len(before) and change > _FAST * np.linalg.norm(before):
+            turn = step - before
+            ideal = (
+                -self._share * float(before @ turn) / max(float(turn @ turn), np.finfo(float).tiny)
+            )
+            self._share = float(np.clip(ideal, _SHORTEST, 1.0))
+        self._step = step
         self._relative.append(change / max(float(np.linalg.norm(found)), np.finfo(float).tiny))
         return at + self._share * step
 

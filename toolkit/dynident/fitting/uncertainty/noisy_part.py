@@ -28,10 +28,10 @@ from dynident.recording.white_noise import encoder_noise_std
 _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 """Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` takes one by one
-_MEMORY = 13 * 2**19
+_MEMORY = 9 * 2**19
 """Bytes that the columns of a motion in a block are meant to take; of four motions they are held at
 a time."""
-_LEAST_BLOCK = 2560  # samples; of many fewer each has a larger part of what a block costs
+_LEAST_BLOCK = 1792  # samples; of many fewer each has a larger part of what a block costs
 _FINEST = 1e-7
 """Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
 without noise is less."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import fdtrc
 
 from dynident.errors import SimulationError
@@ -26,6 +27,7 @@ _CHANCE = 1e-4
 """Probability with which noise of a torque alone would follow readings as far as it does, below
 which a drive has made it of them: divided by a small inertia, noise would be a large motion."""
 _POSES = 50
+_BLOCK = 2048  # samples whose last readings are written out at a time
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,8 +68,12 @@ def trembling(
         inertia.require_positive(values)
     except SimulationError:
         return Trembling(q=still, v=still)
-    which = np.arange(recording.samples) // piece
-    a = np.linalg.solve(inertia.of(values)[which], torque[:, :, None])[:, :, 0] / rate
+    # All samples near a pose at once; the last one may have fewer.
+    count, n = torque.shape
+    near = np.zeros((-(-count // piece), piece, n))
+    near.reshape(-1, n)[:count] = torque
+    moved = np.linalg.solve(inertia.of(values), near.transpose(0, 2, 1)).transpose(0, 2, 1)
+    a = moved.reshape(-1, n)[:count] / rate
     v = _above(np.cumsum(a, axis=0) - a, rate, cutoff_hz)
     q = (v + a / 2) / rate
     return Trembling(q=_above(np.cumsum(q, axis=0) - q, rate, cutoff_hz), v=v)
@@ -80,18 +86,17 @@ def _above(x: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
 def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
     """What the last readings (T, n) explain of a torque (T, n), beyond what chance does."""
     count, n = readings.shape
-    rows = np.zeros((_READINGS, n, count))
-    for lag in range(min(_READINGS, count)):
-        rows[lag, :, lag:] = readings[: count - lag].T
-    rows = rows.reshape(-1, count)
-    scale = np.linalg.norm(rows, axis=1, keepdims=True)
-    rows /= np.where(scale > 0, scale, 1.0)
+    size, rounding = _READINGS * n, np.finfo(float).eps * max(count, _READINGS * n)
+    length = np.linalg.norm(readings, axis=0)
+    padded = np.zeros((count + _READINGS - 1, n))
+    padded[_READINGS - 1 :] = readings / np.where(length > 0, length, 1.0)
+    last = sliding_window_view(padded, _READINGS, axis=0)  # a view: eight times the readings
+    blocks = [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]
     # Least squares of the triangular factor, which has as few rows as there are columns.
-    both = np.concatenate([rows, torque.T]).T[:, None]
-    (factor,) = factorise([(both[:, :, :-1], both[:, :, -1])]).R
-    size, rounding = len(rows), np.finfo(float).eps * max(rows.shape)
+    both = (np.hstack([last[rows].reshape(-1, size), torque[rows]])[:, None] for rows in blocks)
+    (factor,) = factorise((one[:, :, :-1], one[:, :, -1]) for one in both).R
     found = np.linalg.lstsq(factor[:, :size], factor[:, size:], rcond=rounding)[0]
-    explained = (found.T @ rows).T
+    explained = np.concatenate([last[rows].reshape(-1, size) @ found for rows in blocks])
     more, left = (np.sum(x**2, axis=0) for x in (explained, torque - explained))
     free = max(count - size, 1)
     by_chance = fdtrc(size, free, more / size / np.maximum(left / free, 1e-300)) > _CHANCE
