@@ -206,8 +206,7 @@ def fit_evidence(
         left = _left(evidence, columns, values)
         noise = tuple(_no_less(one.noise, _LEAST * max(torque_std)) for one in left)
         found = _held(model, values)
-        change = float(np.linalg.norm(found - at))
-        small = change <= criteria.value_tolerance * np.linalg.norm(values)
+        small = np.linalg.norm(found - at) <= criteria.value_tolerance * np.linalg.norm(values)
         settled = bool(small) or not model.needs_values
         enough = round >= noise_rounds - (near is not None)
         if enough and (small or fixed_point.stalls):
