@@ -9,11 +9,13 @@ import pytest
 
 import dynident as di
 from dynident.effects import catalogue
+from dynident.evidence import evidence_fit
 from dynident.evidence.columns.joint_columns import WhiteColumns
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.noise_model import flat_noise
 from dynident.evidence.runs import gather
+from dynident.fitting.fixed_point import FixedPoint
 from problem_scripts import PROBLEMS
 
 
@@ -33,6 +35,27 @@ def test_load_and_elasticity_settle_together_from_a_robot_without_bodies() -> No
     assert mu == pytest.approx(alone[0].values[-1], abs=3 * sigma[0])
     assert c == pytest.approx(alone[1].values[-1], abs=3 * sigma[1])
     assert both.error_total <= 1.01 * min(one.error_total for one in alone)
+
+
+def test_a_gap_that_is_held_is_no_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its column says another gap than that at which it was taken, in each round the same."""
+    changes = []
+
+    class Watched(FixedPoint):
+        def following(self, model: di.Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+            changes.append((found - at)[model.slices["backlash@shoulder"]])
+            return super().following(model, at, found)
+
+    monkeypatch.setattr(evidence_fit, "FixedPoint", Watched)
+    study = di.load(PROBLEMS / "hidden_effect" / "study.toml")
+    known = catalogue()
+    gap = known["backlash"]("shoulder", None, (20.0, 0.1, 0.3)).at((0.01,))
+    evidence = Evidence(
+        study.model, gather(replace(study.train, recordings=study.train.recordings[:1]))
+    )
+    fitted = fit_evidence(evidence, study.model + gap + known["load_friction"]("elbow"))
+    assert fitted.settled and fitted.values[-2] != pytest.approx(0.01, rel=0.1)
+    assert changes and not np.any(changes)
 
 
 def test_what_changes_at_one_joint_leaves_the_columns_of_the_others() -> None:

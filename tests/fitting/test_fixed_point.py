@@ -72,9 +72,38 @@ def test_values_that_hardly_move_at_first_are_followed_to_their_end() -> None:
         fixed_point.following(model, given, (1.0 + size) * given)
 
 
+@pytest.mark.parametrize("rate", [-0.8, -3.0])
+def test_on_a_line_the_second_step_ends_a_swing(rate: float) -> None:
+    end = 1.1 * Model(arm()).given_values()
+    assert rounds_of(lambda at: end + rate * (at - end), 1e-9) == 3
+
+
+def test_a_step_that_was_cut_is_measured_as_it_was() -> None:
+    """As where an estimate cannot be simulated, and a part of the way to it is gone."""
+    model, fixed_point = Model(arm()), FixedPoint()
+    end = 1.1 * model.given_values()
+
+    def found(at: np.ndarray) -> np.ndarray:
+        return end - 9.0 * (at - end)
+
+    at = model.given_values()
+    cut = at + 0.25 * (fixed_point.following(model, at, found(at)) - at)
+    np.testing.assert_allclose(fixed_point.following(model, cut, found(cut)), end, rtol=1e-12)
+
+
+def test_values_that_creep_away_from_their_start_are_not_held_back() -> None:
+    """Each step is longer than the one before, and none swings."""
+    end = Model(arm()).given_values()
+    at, model, fixed_point = 1e-3 * end, Model(arm()), FixedPoint()
+    for _ in range(25):
+        share = at / end
+        at = fixed_point.following(model, at, at + 0.9 * at * (1.0 - share))
+    np.testing.assert_allclose(at, end, rtol=1e-3)
+
+
 @pytest.mark.parametrize("rates", [(-9.0, -3.0), (-1.5, 0.6), (-0.9, 0.0)])
 def test_values_that_swing_are_brought_together(rates: tuple[float, float]) -> None:
-    """Each parameter at a rate of its own: some swing ever wider, and all grow first."""
+    """Each parameter at a rate of its own, some beyond -1."""
     given = Model(arm()).given_values()
     end, last = 10.0 * given, []
     rate = np.linspace(*rates, len(given))

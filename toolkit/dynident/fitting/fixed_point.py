@@ -7,8 +7,7 @@ import numpy as np
 from dynident.model import Model
 
 _FAST = 0.5
-"""Share of the change before which a change has to stay below, or the next step has another
-length."""
+"""A change below this share of the one before is fast enough: the next step is as long."""
 _SHORTEST = 0.1
 _NEAR = 1e-2
 """Relative change of the values below which they are near their end."""
@@ -20,14 +19,15 @@ of what it was."""
 class FixedPoint:
     """Where the columns are taken next, with shorter steps while the values swing.
 
-    Where the last two changes are not small beside each other, the share of the next step is that
-    at which, were values and changes on one line, the change would be zero (Irons and Tuck, A
-    version of the Aitken accelerator for computer iteration, International Journal for Numerical
-    Methods in Engineering, 1969). No step is longer than the plain one.
+    Where a change is not much smaller than the one before, the share of the next step is that at
+    which, were values and changes on one line, the change would be zero (Irons and Tuck, A version
+    of the Aitken accelerator for computer iteration, International Journal for Numerical Methods
+    in Engineering, 1969). No step is longer than the plain one.
     """
 
     def __init__(self) -> None:
-        self._share, self._step = 1.0, np.zeros(0)
+        self._share = 1.0
+        self._at, self._step = np.zeros(0), np.zeros(0)
         self._relative: list[float] = []
 
     @property
@@ -59,12 +59,12 @@ class FixedPoint:
         step, before = model.relaxed(at, found) - at, self._step
         change = float(np.linalg.norm(step))
         if len(before) and change > _FAST * np.linalg.norm(before):
-            turn = step - before
-            ideal = (
-                -self._share * float(before @ turn) / max(float(turn @ turn), np.finfo(float).tiny)
-            )
+            # The caller may have gone another way than was said.
+            turn, moved = step - before, at - self._at
+            against = -float(moved @ turn)
+            ideal = against / float(turn @ turn) if against > 0.0 else 1.0
             self._share = float(np.clip(ideal, _SHORTEST, 1.0))
-        self._step = step
+        self._at, self._step = at, step
         self._relative.append(change / max(float(np.linalg.norm(found)), np.finfo(float).tiny))
         return at + self._share * step
 

@@ -80,6 +80,8 @@ class Iterations:
     ) -> None:
         self._settings, self.model, self.source = settings, model, source
         self._fixed_point = FixedPoint()
+        # Of values found to those at which their columns were taken: a step may be shorter.
+        self._off = np.inf
         self._good: np.ndarray | None = None
         self.start, self.start_name = start, start_name
         self.simulated: np.ndarray | None = None
@@ -173,15 +175,16 @@ class Iterations:
         found, solution = self._solved()
         model, values = self.model, solution.values
         if model.needs_values:
+            self._off = float(np.linalg.norm(values - self.values))
             values = self._fixed_point.following(model, self.values, values)
             if not self.source.iterates:
                 # The instruments stay: only the columns are taken anew.
                 for _ in range(self._settings.rounds):
-                    change = np.linalg.norm(values - self.values)
                     self.values = values
-                    if change <= self._settings.tolerance * _COLUMNS * np.linalg.norm(values):
+                    if self._off <= self._settings.tolerance * _COLUMNS * np.linalg.norm(values):
                         break
                     found, solution = self._solved()
+                    self._off = float(np.linalg.norm(solution.values - self.values))
                     values = self._fixed_point.following(model, self.values, solution.values)
             self.model = model.at(values)
         R = found.pooled(solution.weights)[: model.size, : model.size]
@@ -214,8 +217,8 @@ class Iterations:
         if any(one.way.share < 1.0 for one in self.rounds[-2:]):
             return False
         if self.model.needs_values:
-            last, one = self.rounds[-1].values, self.rounds[-2].values
-            if np.linalg.norm(last - one) > self._settings.tolerance * np.linalg.norm(last):
+            last = self.rounds[-1].values
+            if self._off > self._settings.tolerance * np.linalg.norm(last):
                 return False
         before, now = (one.error_simulated for one in self.rounds[-2:])
         return abs(now - before) <= self._settings.tolerance * before

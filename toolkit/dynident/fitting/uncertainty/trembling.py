@@ -90,7 +90,8 @@ def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(readings, axis=0)
     padded = np.zeros((count + _READINGS - 1, n))
     padded[_READINGS - 1 :] = readings / np.where(length > 0, length, 1.0)
-    last = sliding_window_view(padded, _READINGS, axis=0)  # a view: eight times the readings
+    # A view: written out it would be eight times the readings.
+    last = sliding_window_view(padded, _READINGS, axis=0)
     blocks = [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]
     # Least squares of the triangular factor, which has as few rows as there are columns.
     both = (np.hstack([last[rows].reshape(-1, size), torque[rows]])[:, None] for rows in blocks)
