@@ -72,8 +72,9 @@ def test_values_that_hardly_move_at_first_are_followed_to_their_end() -> None:
         fixed_point.following(model, given, (1.0 + size) * given)
 
 
-@pytest.mark.parametrize("rate", [-0.8, -3.0])
+@pytest.mark.parametrize("rate", [-0.8, -3.0, -9.0])
 def test_on_a_line_the_second_step_ends_a_swing(rate: float) -> None:
+    """However far it has grown first."""
     end = 1.1 * Model(arm()).given_values()
     assert rounds_of(lambda at: end + rate * (at - end), 1e-9) == 3
 
