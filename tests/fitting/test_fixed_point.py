@@ -75,8 +75,15 @@ def test_values_that_hardly_move_at_first_are_followed_to_their_end() -> None:
 @pytest.mark.parametrize("rate", [-0.8, -3.0, -9.0])
 def test_on_a_line_the_second_step_ends_a_swing(rate: float) -> None:
     """However far it has grown first."""
-    end = 1.1 * Model(arm()).given_values()
-    assert rounds_of(lambda at: end + rate * (at - end), 1e-9) == 3
+    given = Model(arm()).given_values()
+    end, off = 10.0 * given, []
+
+    def found(at: np.ndarray) -> np.ndarray:
+        off.append(float(np.linalg.norm(at - end) / np.linalg.norm(end)))
+        return end + rate * (at - end)
+
+    assert rounds_of(found, 1e-9) == 3
+    assert off[1] == pytest.approx(-rate * off[0]) and off[-1] < 1e-9
 
 
 def test_a_step_that_was_cut_is_measured_as_it_was() -> None:
