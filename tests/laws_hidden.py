@@ -9,7 +9,7 @@ import numpy as np
 from dynident.criteria import Criteria
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.search.path import Path, judged_on
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.effects import Law, law_effect

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dynident.diagnosis.search.ranking import rank
-from dynident.diagnosis.search.scoring import candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.effects import Effect, catalogue, effects_of
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence

@@ -9,7 +9,7 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.diagnosis.search.selection import AddedEffect, without_superfluous
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence

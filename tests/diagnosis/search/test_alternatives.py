@@ -7,7 +7,7 @@ import pytest
 
 from dynident.diagnosis.search.alternatives import as_likely
 from dynident.diagnosis.search.ranking import Ranking, rank
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.diagnosis.search.selection import AddedEffect, choose
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynident.diagnosis.search.path import responses_in_place
-from dynident.diagnosis.search.scoring import candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence

@@ -12,7 +12,7 @@ import pytest
 from dynident.criteria import Criteria
 from dynident.diagnosis.search import ranking
 from dynident.diagnosis.search.ranking import best_first, rank
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence

@@ -13,7 +13,7 @@ from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.extension import extending
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.refusal import newly_impossible
-from dynident.diagnosis.search.scoring import Score, impossible
+from dynident.diagnosis.search.scores.score import Score, impossible
 from dynident.diagnosis.search.selection import breaks_its_promise
 from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence

@@ -6,6 +6,7 @@ same motion. `x` are columns of the model, `z` those of the effect beside it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -17,12 +18,12 @@ import pytest
 from dynident import diagnose
 from dynident.criteria import Criteria
 from dynident.diagnosis.search.cross_validation import cross_validate
-from dynident.diagnosis.search.scoring import (
-    Score,
-    impossible,
+from dynident.diagnosis.search.scores.candidate_moments import (
+    CandidateMoments,
     moments_with_payload,
-    score,
 )
+from dynident.diagnosis.search.scores.score import Score, impossible
+from dynident.diagnosis.search.scores.scoring import score, scores
 from dynident.effects import Effect, effects_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
@@ -51,6 +52,14 @@ def replicated(signal: np.ndarray, std: float, rng: np.random.Generator) -> np.n
 
 def products(left: np.ndarray, right: np.ndarray, edges: np.ndarray = EDGES) -> SecondMoments:
     return row_moments(left, right, edges, "repeated")
+
+
+def side_by_side(
+    parts: Sequence[SecondMoments], put: Callable[..., np.ndarray], axis: int
+) -> SecondMoments:
+    """Moments of the same rows in one."""
+    total, signal = (put([getattr(p, n) for p in parts], axis=axis) for n in ("total", "signal"))
+    return SecondMoments(total, parts[0].counts, None, signal)
 
 
 class Rows:
@@ -204,6 +213,36 @@ def test_of_two_equal_columns_one_direction_is_left() -> None:
     found = score(rows.fitted, ripple, beside, products(twice, twice), 1)
     assert found.rank == 1
     assert sum(found.values) == pytest.approx(rows.scored().values[0], rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_variants_are_scored_as_if_each_were_alone() -> None:
+    """Whatever stands beside them: columns that are dependent, the model's, zero, or no numbers."""
+    rows, rng = Rows((0.3, -0.2), 0), np.random.default_rng(1)
+    torque = rows.x @ OF_MODEL + rows.z @ [0.3, -0.2]
+    known = np.tile(np.column_stack([rows.x, torque]), (REPLICATES, 1, 1))
+    noisy, plain = replicated(rows.z, 1.0, rng), replicated(rows.z, 0.0, rng)
+    others = replicated(rng.normal(size=rows.z.shape), 30.0, rng)
+    half = plain * [1.0, 0.0]
+    model = np.tile(rows.x[:, :2], (REPLICATES, 1, 1))
+    columns = [noisy, plain[..., [0, 0]], model, np.inf * plain, half, others]
+    one = effect("torque_ripple@elbow")
+    variants = [one.shaped(float(k)) for k in range(1, 7)]
+    grid = np.array([1, 2, 3, 4, 5, 6])
+    each = [(products(known, z), products(z, z)) for z in columns]
+    moments = CandidateMoments(
+        side_by_side([beside for beside, _ in each], np.concatenate, 2),
+        side_by_side([own for _, own in each], np.stack, 1),
+    )
+    found = scores(rows.fitted, variants, moments, grid)
+    alone = [
+        score(rows.fitted, *of) for of in zip(variants, *zip(*each, strict=True), grid, strict=True)
+    ]
+    assert [one.rank for one in found] == [2, 1, 0, 0, 1, 0]
+    for a, b in zip(found, alone, strict=True):
+        assert (a.effect, a.not_identifiable, a.rank) == (b.effect, b.not_identifiable, b.rank)
+        numbers = [(*x.values, *x.sigma, x.drop, x.p_value, x.penalised, x.fall) for x in (a, b)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
 
 
 def test_a_column_that_is_nothing_but_noise_is_identifiable_and_explains_nothing() -> None:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.errors import FitError
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence

@@ -14,7 +14,8 @@ from scipy import special
 
 from dynident.diagnosis.details import place
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.scoring import Score, price
+from dynident.diagnosis.search.scores.score import Score
+from dynident.diagnosis.search.scores.scoring import price
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

@@ -194,6 +194,14 @@ class SecondMoments:
         """Return one of several sets of products (B, ..., a, b) of the same rows."""
         return self._with(lambda products: products[:, place])
 
+    def where(self, kept: np.ndarray) -> SecondMoments:
+        """Return the products, zero where a mask of their shape, or its last axes, is False."""
+        return self._with(lambda products: np.where(kept, products, 0.0), mean=self.mean)
+
+    def as_set(self) -> SecondMoments:
+        """Return the products (..., a, b) as the only one of several sets, (..., 1, a, b)."""
+        return self._with(lambda products: products[..., None, :, :])
+
     def among(self, chosen: slice | np.ndarray) -> SecondMoments:
         """Return the products of some columns with each other."""
         mean = None if self.mean is None else self.mean[..., chosen]

@@ -161,12 +161,12 @@ def solve_products(
 
 
 def eigenvectors(products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (p,), ascending, and eigenvectors (p, p) of symmetric products (p, p).
+    """Eigenvalues (..., p), ascending, and eigenvectors of symmetric products, (..., p, p) both.
 
     Most effects have one column, of which there is nothing to work out.
     """
-    if products.shape == (1, 1):
-        return products[0].copy(), np.ones((1, 1))
+    if products.shape[-1] == 1:
+        return products[..., 0].copy(), np.ones_like(products)
     return np.linalg.eigh(products)
 
 

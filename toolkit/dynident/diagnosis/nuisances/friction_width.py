@@ -22,7 +22,7 @@ from scipy.special import chdtri
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.candidate_shapes import reshaped
 from dynident.diagnosis.search.ranking import rank
-from dynident.diagnosis.search.scoring import candidate_moments
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of

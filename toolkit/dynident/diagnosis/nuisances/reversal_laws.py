@@ -27,7 +27,7 @@ from dynident.diagnosis.nuisances.other_reversals import (
     OtherReversal,
 )
 from dynident.diagnosis.search.ranking import joints_below_noise, rank
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, signal_by_joint

@@ -11,7 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynident.diagnosis.search.scoring import candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.effects import Block, JointEffect, LawEffect, Parameter
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

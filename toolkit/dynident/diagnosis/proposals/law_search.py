@@ -23,7 +23,9 @@ from dynident.diagnosis.proposals.term_screen import Screened, screen
 from dynident.diagnosis.search.cross_validation import signed_rank
 from dynident.diagnosis.search.path import judged_on
 from dynident.diagnosis.search.ranking import judged
-from dynident.diagnosis.search.scoring import Score, candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
+from dynident.diagnosis.search.scores.score import Score
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect

@@ -16,12 +16,12 @@ import numpy as np
 from dynident.diagnosis.search.confidence_set import as_good_as_first
 from dynident.diagnosis.search.payload_recordings import with_payload
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.scoring import (
-    Score,
+from dynident.diagnosis.search.scores.candidate_moments import (
     candidate_moments,
     moments_with_payload,
-    score,
 )
+from dynident.diagnosis.search.scores.score import Score
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of

@@ -9,7 +9,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from dynident.diagnosis.search.moment_objective import MomentObjective
-from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import Columns, candidate_moments
+from dynident.diagnosis.search.scores.score import Score
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.diagnosis.search.shapes.residual_lines import line_width, lines
 from dynident.effects import Effect, ShapeParameter
 from dynident.evidence.evidence import Evidence

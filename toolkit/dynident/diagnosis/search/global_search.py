@@ -24,7 +24,9 @@ from dynident.criteria import GlobalSearchCriteria
 from dynident.diagnosis.dependence.bursts import beyond_reversals, bursts_in
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
-from dynident.diagnosis.search.scoring import Score, admissible, candidate_moments, score
+from dynident.diagnosis.search.scores.candidate_moments import candidate_moments
+from dynident.diagnosis.search.scores.score import Score, admissible
+from dynident.diagnosis.search.scores.scoring import scores
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
@@ -360,7 +362,4 @@ def _shapes_within(
 
 
 def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:
-    parts = candidate_moments(evidence, fitted, tried)
-    return [
-        score(fitted, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
-    ]
+    return scores(fitted, tried, candidate_moments(evidence, fitted, tried), len(tried))

@@ -14,14 +14,13 @@ from typing import ClassVar
 import numpy as np
 from scipy.linalg import block_diag
 
-from dynident.diagnosis.search.scoring import (
+from dynident.diagnosis.search.scores.candidate_moments import (
     Columns,
-    Score,
-    admissible,
     candidate_moments,
     moments_with_payload,
-    score,
 )
+from dynident.diagnosis.search.scores.score import Score, admissible
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.diagnosis.search.shapes.residual_lines import shapes_tried
 from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
 from dynident.evidence.evidence import Evidence

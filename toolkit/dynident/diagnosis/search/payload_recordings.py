@@ -16,13 +16,13 @@ from itertools import product
 import numpy as np
 from scipy.linalg import block_diag
 
-from dynident.diagnosis.search.cleared_columns import cleared
-from dynident.diagnosis.search.scoring import (
-    Score,
+from dynident.diagnosis.search.scores.candidate_moments import (
     candidate_moments,
     moments_with_payload,
-    score,
 )
+from dynident.diagnosis.search.scores.cleared_columns import cleared
+from dynident.diagnosis.search.scores.score import Score
+from dynident.diagnosis.search.scores.scoring import score
 from dynident.effects import Effect, catalogue
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
@@ -96,10 +96,11 @@ def unconfirmed(evidence: Evidence, fitted: EvidenceFit, one: Score) -> str:
         return ""
     (whole,) = candidate_moments(evidence, fitted, [one.effect])
     parts = tuple(moments_with_payload(part, evidence, choice) for part in whole)
-    found = cleared(fitted, parts[0].pooled(), parts[1].pooled(), _used(parts[1]))
-    if found is None:
+    own = parts[1].as_set().pooled()
+    found = cleared(fitted, parts[0].pooled(), own, _used(own))
+    if not found.identifiable[0]:
         return "its columns are noise in this data"
-    gains = _gains_of_halves(evidence, fitted, whole, one, found.back)
+    gains = _gains_of_halves(evidence, fitted, whole, one, found.back[0])
     for run, carries, halves in zip(evidence.runs, choice, gains, strict=True):
         if not all((gain > 0) == carries for gain in halves):
             return f"the two halves of {run.recording.name} differ on whether it is carried there"
@@ -150,19 +151,20 @@ def _best_drop(evidence: Evidence, fitted: EvidenceFit, name: str) -> float:
             np.concatenate([b.signal for b, _ in parts], axis=1),
         )
         own = SecondMoments(
-            np.asarray(block_diag(*(s.total for _, s in parts))),
+            np.asarray(block_diag(*(s.total for _, s in parts)))[None],
             parts[0][1].counts,
             None,
-            np.asarray(block_diag(*(s.signal for _, s in parts))),
+            np.asarray(block_diag(*(s.signal for _, s in parts)))[None],
         )
-        found = cleared(fitted, beside, own, np.diag(own.signal) > 0)
-        if found is not None and found.part.rank:
-            most = max(most, found.drop - found.part.rank * np.log(fitted.rows) - price)
+        found = cleared(fitted, beside, own, _used(own))
+        (drop,), (rank,) = found.drops, found.ranks
+        if rank:
+            most = max(most, float(drop - rank * np.log(fitted.rows) - price))
     return most
 
 
 def _used(own: SecondMoments) -> np.ndarray:
-    return np.diag(own.pooled().signal) > 0
+    return np.diagonal(own.signal, axis1=1, axis2=2) > 0
 
 
 def with_payload(evidence: Evidence, score: Score) -> Evidence:

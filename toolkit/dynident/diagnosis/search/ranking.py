@@ -16,14 +16,12 @@ from dynident.diagnosis.search.cross_validation import (
     left_out_losses,
 )
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
-from dynident.diagnosis.search.scoring import (
-    Score,
+from dynident.diagnosis.search.scores.candidate_moments import (
     candidate_moments,
-    impossible,
     moments_with_payload,
-    price,
-    score,
 )
+from dynident.diagnosis.search.scores.score import Score, impossible
+from dynident.diagnosis.search.scores.scoring import scores
 from dynident.diagnosis.search.shapes.residual_lines import (
     is_beyond,
     lines,
@@ -43,9 +41,6 @@ _BEYOND = 0.01
 """Share of all chances of a false effect that lines beyond the grids of ripples have: hundreds of
 them, which few robots have, are not to make the others less significant (weighted Bonferroni). Such
 a line is sharp: where there is one, it is significant all the same."""
-_ROUGHLY = 0.1
-"""By which a shape may explain more than `drops_at_most` says, where directions are unreliable; of
-robots' recordings 1e-10 is the most that was seen."""
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -267,14 +262,12 @@ def _score_variants(
     more = lines_beyond(evidence, effect)
     grid = [count + more if is_beyond(one, robot) else count for one in shapes]
     moments = candidate_moments(evidence, fitted, shapes, evidence.first_look)
-    most = (1.0 + _ROUGHLY) * moments.drops_at_most(fitted.beside(effect))
-    most -= price(fitted, effect, 1, np.array(grid))
+    every = scores(fitted, shapes, moments, np.array(grid))
     found, best = {}, -np.inf
-    for v in np.argsort(-most, kind="stable").tolist():
-        if most[v] < best - untold(evidence, effect):
+    for v in sorted(range(len(every)), key=lambda v: -every[v].penalised):
+        if every[v].penalised < best - untold(evidence, effect):
             break
-        scored = score(fitted, shapes[v], *moments.of(v), grid=grid[v])
-        found[v] = _possible(scored, evidence, fitted)
+        found[v] = _possible(every[v], evidence, fitted)
         best = max(best, found[v].penalised)
     yield from (found[v] for v in sorted(found))
 

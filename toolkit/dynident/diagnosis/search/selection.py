@@ -15,7 +15,7 @@ import numpy as np
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.search.alternatives import alternatives, as_likely
 from dynident.diagnosis.search.ranking import Ranking, rank
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.scores.score import Score
 from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
