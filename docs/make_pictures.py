@@ -79,7 +79,7 @@ def noisy_positions() -> None:
 
 def report_page(diagnosis: di.diagnosis.Diagnosis) -> None:
     """The top of the report as a browser shows it; left as it is where there is no chromium."""
-    browser = which("chromium")
+    browser = which("chromium-headless-shell") or which("chromium")
     if browser is None:
         print("no chromium: report.png is not drawn again")
         return

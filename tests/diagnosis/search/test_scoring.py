@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from dynident import diagnose
 from dynident.criteria import Criteria
@@ -242,7 +243,46 @@ def test_variants_are_scored_as_if_each_were_alone() -> None:
     for a, b in zip(found, alone, strict=True):
         assert (a.effect, a.not_identifiable, a.rank) == (b.effect, b.not_identifiable, b.rank)
         numbers = [(*x.values, *x.sigma, x.drop, x.p_value, x.penalised, x.fall) for x in (a, b)]
-        assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-9, abs=0.0)
+
+
+def test_scores_are_those_of_regressions_on_the_rows() -> None:
+    """Of two columns, of two that are one, and of two taken at given values."""
+    rng = np.random.default_rng(2)
+    x, z = rng.normal(size=(INSTANTS, 3)), rng.normal(size=(INSTANTS, 2))
+    z += 0.5 * x[:, :1]
+    y = x @ OF_MODEL + z @ [0.1, -0.05] + rng.normal(size=INSTANTS)
+    columns = [z, z[:, [0, 0]] * [1.0, 2.0], z]
+    one, point = effect("torque_ripple@elbow"), (0.25, -0.1)
+    variants = [one, one.shaped(2.0), replace(one, point=point)]
+    known, every = np.column_stack([x, y])[None], np.hstack(columns)[None]
+    own = [row_moments(each[None], each[None], EDGES, "single") for each in columns]
+    beside = row_moments(known, every, EDGES, "single")
+    moments = CandidateMoments(beside, side_by_side(own, np.stack, 1))
+    without = fitted(row_moments(known, known, EDGES, "single"))
+    found = scores(without, variants, moments, 7)
+    assert [one.rank for one in found] == [2, 1, 2]
+    residual = y - x @ np.linalg.lstsq(x, y)[0]
+    for a, each in zip(found, columns, strict=True):
+        left = each - x @ np.linalg.lstsq(x, each)[0]
+        axes = np.linalg.svd(left, full_matrices=False)[0][:, : a.rank]
+        rest = residual - axes @ (axes.T @ residual)
+        assert a.drop == pytest.approx(residual @ residual - rest @ rest)
+        parts = zip(np.split(axes, EDGES[1:-1]), np.split(rest, EDGES[1:-1]), strict=True)
+        blocks = np.array([part.T @ of for part, of in parts])
+        spread = blocks.T @ blocks * BLOCKS / (BLOCKS - 1)
+        wald = residual @ axes @ np.linalg.solve(spread, axes.T @ residual)
+        ratio = wald * (BLOCKS - a.rank) / (a.rank * (BLOCKS - 1))
+        chance = stats.f.sf(ratio, a.rank, BLOCKS - a.rank)
+        assert a.p_value == pytest.approx(chance, rel=1e-9, abs=0.0)
+        worth = (a.rank + len(one.shape)) * np.log(INSTANTS) + 2.0 * np.log(7)
+        assert a.penalised == pytest.approx(a.drop - worth)
+        at = np.array(a.effect.point or a.values)
+        taken = residual - left @ at
+        assert a.fall == pytest.approx(residual @ residual - taken @ taken)
+        if a.rank == 2:
+            assert a.values == pytest.approx(np.linalg.lstsq(left, residual)[0])
+            assert a.sigma == pytest.approx(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
 
 
 def test_a_column_that_is_nothing_but_noise_is_identifiable_and_explains_nothing() -> None:

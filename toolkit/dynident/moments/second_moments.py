@@ -195,8 +195,8 @@ class SecondMoments:
         return self._with(lambda products: products[:, place])
 
     def where(self, kept: np.ndarray) -> SecondMoments:
-        """Return the products, zero where a mask of their shape, or its last axes, is False."""
-        return self._with(lambda products: np.where(kept, products, 0.0), mean=self.mean)
+        """Return the products about zero, 0 where a mask of their shape, or its last axes, is."""
+        return self._with(lambda products: np.where(kept, products, 0.0))
 
     def as_set(self) -> SecondMoments:
         """Return the products (..., a, b) as the only one of several sets, (..., 1, a, b)."""

@@ -3,9 +3,9 @@
 In: evidence (`dynident.evidence`: recordings as replicates, columns, noise) and a model fitted to
 it. Out: a `Ranking` of every effect that the model lacks, and the effect to add.
 
-- `scoring`: what one effect with one shape would bring, from second moments: the drop of the
-  squared residual, its p value, its price, its held-out gain. Here it is decided whether an effect
-  is identifiable, and whether its values are possible.
+- `scores`: what an effect with one shape, or many, would bring, from second moments: the drop of
+  the squared residual, its p value, its price. Here it is decided whether an effect is
+  identifiable, and whether its values are possible.
 - `ranking`: all effects scored, the best refined and cross-validated; the gates.
 - `candidate_shapes` and what they call: the shape parameters, and the values at which columns are
   linearised, at which an effect explains most. `shaped_fit`: the same for effects in the model.

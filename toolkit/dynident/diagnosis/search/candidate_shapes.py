@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from dynident.diagnosis.search.moment_objective import MomentObjective
 from dynident.diagnosis.search.scores.candidate_moments import Columns, candidate_moments
 from dynident.diagnosis.search.scores.score import Score
-from dynident.diagnosis.search.scores.scoring import score
+from dynident.diagnosis.search.scores.scoring import scores
 from dynident.diagnosis.search.shapes.residual_lines import line_width, lines
 from dynident.effects import Effect, ShapeParameter
 from dynident.evidence.evidence import Evidence
@@ -213,9 +213,8 @@ def best_shape(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effec
     """
     found = lines(evidence, fitted, effect)
     tried = [effect, *effect.variants(fitted.model.robot), *found]
-    found = candidate_moments(evidence, fitted, tried)
-    scores = (score(fitted, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
-    best = max(scores, key=lambda one: one.drop_at_point)
+    every = scores(fitted, tried, candidate_moments(evidence, fitted, tried), 1)
+    best = max(every, key=lambda one: one.drop_at_point)
     return refined(evidence, fitted, best).effect if best.drop_at_point > 0 else effect
 
 

@@ -151,11 +151,11 @@ def _best_drop(evidence: Evidence, fitted: EvidenceFit, name: str) -> float:
             np.concatenate([b.signal for b, _ in parts], axis=1),
         )
         own = SecondMoments(
-            np.asarray(block_diag(*(s.total for _, s in parts)))[None],
+            np.asarray(block_diag(*(s.total for _, s in parts))),
             parts[0][1].counts,
             None,
-            np.asarray(block_diag(*(s.signal for _, s in parts)))[None],
-        )
+            np.asarray(block_diag(*(s.signal for _, s in parts))),
+        ).as_set()
         found = cleared(fitted, beside, own, _used(own))
         (drop,), (rank,) = found.drops, found.ranks
         if rank:

@@ -39,13 +39,8 @@ class CandidateMoments:
     beside: SecondMoments
     own: SecondMoments
 
-    @property
-    def sets(self) -> int:
-        """Number of variants, V."""
-        return self.own.total.shape[1]
-
     def __iter__(self) -> Iterator[tuple[SecondMoments, SecondMoments]]:
-        return (self.of(place) for place in range(self.sets))
+        return (self.of(place) for place in range(self.own.total.shape[1]))
 
     def of(self, place: int) -> tuple[SecondMoments, SecondMoments]:
         """Return the moments of one variant's columns with the model's, and with themselves."""

@@ -65,9 +65,9 @@ def cleared(
     Parameters
     ----------
     fitted : the model without the columns.
-    with_model : of all columns, set by set, with the model's and the torque, (p + 1, V k).
-    with_self : of each set's columns with themselves, (V, k, k).
-    seen : (V, k) which of them count; none of a set whose moments are not all finite.
+    with_model : of all columns, set by set, with the model's and the torque, (p + 1, V k); finite.
+    with_self : of each set's columns with themselves, (V, k, k); finite.
+    seen : (V, k) which of them count.
 
     Returns
     -------

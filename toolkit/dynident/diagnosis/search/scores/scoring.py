@@ -116,7 +116,7 @@ def price(
     ----------
     fitted : the model without it.
     effect : with its shapes.
-    rank : number of its parameters that the data can tell.
+    rank : number of its parameters that the data can tell, of one or of each of many.
     grid : number of shapes that were tried, of one or of each of many.
 
     Returns
@@ -151,7 +151,7 @@ def _seen(
         for one in variants
     ]
     least = fitted.criteria.gates.unseen * np.sqrt(fitted.rows) / np.array(bounds)
-    return moments, beside, own, (scale > least) & finite[:, None]
+    return moments, beside, own, scale > least
 
 
 def _block_scores(fitted: EvidenceFit, moments: CandidateMoments, found: Cleared) -> np.ndarray:
