@@ -195,7 +195,7 @@ class SecondMoments:
         return self._with(lambda products: products[:, place])
 
     def where(self, kept: np.ndarray) -> SecondMoments:
-        """Return the products about zero, 0 where a mask of their shape, or its last axes, is."""
+        """Return products, 0 where a mask of their shape, or of its last axes, is False."""
         return self._with(lambda products: np.where(kept, products, 0.0))
 
     def as_set(self) -> SecondMoments:
