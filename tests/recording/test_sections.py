@@ -8,6 +8,7 @@ from dynident.errors import RecordingError
 from dynident.recording import lowpass
 from dynident.recording.low_pass.sections import (
     butterworth_sections,
+    normal_form,
     response,
     slowest_pole,
     state_at_rest,
@@ -40,6 +41,28 @@ def test_a_filter_that_was_at_rest_stays_there() -> None:
     sections = butterworth_sections(0.02, 4)
     out, _ = signal.sosfilt(sections, np.ones(50), zi=state_at_rest(sections))
     np.testing.assert_allclose(out, 1.0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [*(butterworth_sections(share, 4) for share in (1e-3, 0.1, 0.5, 0.97)), CHEBYSHEV],
+)
+def test_the_normal_form_is_the_same_filter(sections: np.ndarray) -> None:
+    form = normal_form(sections)
+    angle = np.linspace(0.01, np.pi - 0.01, 50)
+    turn = np.exp(1j * angle)[:, None, None] * np.eye(len(form.into)) - form.across
+    into = np.broadcast_to(form.into[:, None], (len(angle), len(form.into), 1))
+    found = form.through + (form.out @ np.linalg.solve(turn, into))[:, 0]
+    np.testing.assert_allclose(found, signal.sosfreqz(sections, angle)[1], rtol=0, atol=1e-12)
+    # At rest at one it stays, and gives what the sections do of a constant.
+    np.testing.assert_allclose(form.across @ form.rest + form.into, form.rest, atol=1e-14)
+    constant = np.prod(sections[:, :3].sum(axis=1) / sections[:, 3:].sum(axis=1))
+    assert form.out @ form.rest + form.through == pytest.approx(constant, rel=1e-9)
+
+
+def test_a_section_of_real_poles_has_no_normal_form() -> None:
+    with pytest.raises(ValueError, match="real poles"):
+        normal_form(np.array([[1.0, 2.0, 1.0, 1.0, -0.75, 0.125]]))
 
 
 def test_an_odd_order_is_refused() -> None:

@@ -19,8 +19,8 @@ from dynident.effects.transmissions.dead_zone_source import ENTRY, LANES, SOURCE
 
 T = TypeVar("T")
 
-_TOGETHER = 20_000_000
-"""Steps, over all links, that are walked through at once: a dozen numbers each are in memory."""
+_AT_ONCE = 512
+"""Steps whose factors are worked out at a time: those of a hundred links stay in the cache."""
 
 
 @dataclass(frozen=True)
@@ -151,33 +151,41 @@ def _compiled(walk: Any, links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
 
 def _replayed(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     """Return how links move, by NumPy: a step costs the same for one and for dozens."""
-    longest = max(len(link.a) for link in links)
-    most = max(1, _TOGETHER // longest)
-    if len(links) > most:
-        return [one for part in _parts(links, most) for one in _replayed(part)]
-    recursion = _Recursion.of(links)
     if len(links) == 1:
-        return [_walk(recursion)]
+        return [_walk(links[0])]
+    d = np.zeros((len(links), max(len(link.a) for link in links)))
+    d[:, :2] = _starts(links)
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
-        d = _walk_together(recursion)
-    own = enumerate(links)
-    return [DeadZoneMotion(d[: len(one.a), v], one.gear.half_gap) for v, one in own]
+        for first in range(1, d.shape[1] - 1, _AT_ONCE):
+            some = slice(first, min(first + _AT_ONCE, d.shape[1] - 1))
+            found = _walk_together(_Recursion.of(links, some), d[:, first - 1 : first + 1].T)
+            d[:, some.start + 1 : some.stop + 1] = found.T
+    own = zip(links, d, strict=True)
+    return [DeadZoneMotion(moved[: len(one.a)], one.gear.half_gap) for one, moved in own]
+
+
+def _starts(links: Sequence[DeadZoneLink]) -> np.ndarray:
+    """Deflections in the first two steps, at rest, (V, 2)."""
+    load, g = (np.array(x) for x in ([link.resting for link in links], [x.g[:2] for x in links]))
+    gears = [link.gear for link in links]
+    K, half = np.array([(one.stiffness, one.half_gap) for one in gears]).T[..., None]
+    lean = np.where(load >= 0.0, 1.0, -1.0)
+    return (load + lean * K * half) / (g + K)
 
 
 @dataclass(frozen=True, eq=False)
 class _Recursion:
-    """What the recursion of V links multiplies by in each step, as long as the longest of them.
+    """What the recursion of V links multiplies by in each of S steps.
 
     Attributes
     ----------
-    start, load : (2, V) first deflections, and (S, V).
+    load : (S, V).
     drive : (S, 2, V) of a deflection, and of what of it is beyond the gap.
     free, touching : (S, 2, V) of what drives a link, and of its deflection a step back.
     half : (V,) of the gap.
     """
 
-    start: np.ndarray
     load: np.ndarray
     drive: np.ndarray
     free: np.ndarray
@@ -185,40 +193,39 @@ class _Recursion:
     half: np.ndarray
 
     @classmethod
-    def of(cls, links: Sequence[DeadZoneLink]) -> _Recursion:
-        """Return it of all links; shorter ones repeat their last step."""
-        steps = max(len(link.a) for link in links)
+    def of(cls, links: Sequence[DeadZoneLink], some: slice) -> _Recursion:
+        """Return it of some steps of all links; shorter ones repeat their last step."""
+        steps = some.stop - some.start
         m, load, c, g = np.empty((4, steps, len(links)))
         for v, link in enumerate(links):
             for whole, own in ((m, link.m), (load, link.load), (c, link.c), (g, link.g)):
-                whole[: len(own), v], whole[len(own) :, v] = own, own[-1]
+                known = own[some]
+                whole[: len(known), v], whole[len(known) :, v] = known, own[-1]
         h = np.array([link.step for link in links])
         gears = [link.gear for link in links]
         K, D, half = np.array([(one.stiffness, one.damping, one.half_gap) for one in gears]).T
         mass, damping = m / h**2, c / (2.0 * h)
-        lean = np.where(load[:2] >= 0.0, 1.0, -1.0)
-        start = (load[:2] + lean * K * half) / (g[:2] + K)
         drive, free, touching = np.empty((3, steps, 2, len(links)))
         drive[:, 0], drive[:, 1] = 2.0 * mass - g, K
         for factors, damped in ((free, damping), (touching, damping + D / (2.0 * h))):
             factors[:, 0] = 1.0 / (mass + damped)
             factors[:, 1] = (mass - damped) * factors[:, 0]
-        return cls(start, load, drive, free, touching, half)
+        return cls(load, drive, free, touching, half)
 
 
-def _walk_together(r: _Recursion) -> np.ndarray:
-    """Return deflections (S, V) of V links.
+def _walk_together(r: _Recursion, first: np.ndarray) -> np.ndarray:
+    """Return the next deflections (S, V) of V links after two known ones, (2, V).
 
     The call is what costs in a step, not its dozens of numbers: as few as can be.
     """
-    both = np.zeros_like(r.drive)
+    both = np.empty((len(r.load) + 2, 2, len(r.half)))
     d = both[:, 0]
-    d[:2] = r.start
+    d[:2] = first
     half, low, zero = r.half, -r.half, np.zeros_like(r.half)
     driven, factors = np.empty_like(both[0]), np.empty_like(both[0])
     (pushed, held), (ahead, back), touches = driven, factors, np.empty(len(half), dtype=bool)
-    now_on = (x[1:-1] for x in (both, d, both[:, 1], r.drive, r.load, r.free, r.touching))
-    steps = zip(*now_on, d[:-2], d[2:], strict=True)
+    known = (both[1:-1], d[1:-1], both[1:-1, 1], r.drive, r.load, r.free, r.touching)
+    steps = zip(*known, d[:-2], d[2:], strict=True)
     for state, now, beyond, drive, load, free, touching, before, after in steps:
         np.maximum(now, low, out=beyond)
         np.minimum(beyond, half, out=beyond)
@@ -232,18 +239,19 @@ def _walk_together(r: _Recursion) -> np.ndarray:
         np.multiply(pushed, ahead, out=pushed)
         np.multiply(back, before, out=held)
         np.subtract(pushed, held, out=after)
-    return d
+    return d[2:]
 
 
-def _walk(r: _Recursion) -> DeadZoneMotion:
+def _walk(link: DeadZoneLink) -> DeadZoneMotion:
     """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
-    load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), float(r.drive[0, 1, 0])
+    r = _Recursion.of([link], slice(1, len(link.a) - 1))
+    load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), link.gear.stiffness
     free, free_back = r.free[:, :, 0].T.tolist()
     touching, touching_back = r.touching[:, :, 0].T.tolist()
-    half = float(r.half[0])
-    before, now = r.start[:, 0].tolist()
-    d = [before, now, *[0.0] * (len(load) - 2)]
-    for k in range(1, len(load) - 1):
+    half = link.gear.half_gap
+    before, now = _starts([link])[0].tolist()
+    d = [before, now]
+    for k in range(len(load)):
         pushed = load[k] + inertia[k] * now
         if now > half:
             after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
@@ -252,5 +260,5 @@ def _walk(r: _Recursion) -> DeadZoneMotion:
         else:
             after = pushed * free[k] - free_back[k] * before
         before, now = now, after
-        d[k + 1] = after
+        d.append(after)
     return DeadZoneMotion(np.array(d), half)

@@ -28,9 +28,9 @@ from dynident.recording.white_noise import encoder_noise_std
 _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 """Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` takes one by one
-_MEMORY = 9 * 2**19
-"""Bytes that the columns of a motion in a block are meant to take; of four motions they are held at
-a time."""
+_HELD = 4  # motions whose columns of a block are held at a time, as decimated rows
+_MEMORY = (1 + _HELD) * 9 * 2**19
+"""Bytes that these are meant to take, with those of one motion before they are decimated."""
 _LEAST_BLOCK = 1792  # samples; of many fewer each has a larger part of what a block costs
 _FINEST = 1e-7
 """Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
@@ -122,7 +122,8 @@ class NoisyPart:
             true = (replace(seen, v=seen.v + one), replace(seen, v=seen.v - other))
         fewer = min(sampled.count, fewer)
         start = sampled.kept.start + (sampled.count - fewer) // 2
-        fitting = _MEMORY // (8 * model.robot.n * model.size)
+        held = 1.0 + _HELD / sampled.parallel.step  # rows for each sample
+        fitting = int(_MEMORY / held) // (8 * model.robot.n * model.size)
         at_once = min(BLOCK, max(_LEAST_BLOCK, fitting))
         return cls(
             sampled=replace(

@@ -6,6 +6,8 @@ turn, it takes longer than most fits.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -69,6 +71,64 @@ def state_at_rest(sections: np.ndarray) -> np.ndarray:
     gains = forward.sum(axis=1) / backward.sum(axis=1)
     enters = np.cumprod(np.append(1.0, gains[:-1]))
     return np.stack([first, second], axis=1) * enters[:, None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NormalForm:
+    """A filter with n states s: s' = across s + into x, y = out s + through x.
+
+    Each pair of states turns and fades as a pair of poles, so that they are no larger than what
+    comes of them; those of direct forms are, for low cut-offs, and lose digits.
+
+    Attributes
+    ----------
+    across : (n, n)
+    into, out : (n,)
+    through : what a sample makes of itself.
+    rest : (n,) states after a long time at one.
+    """
+
+    across: np.ndarray
+    into: np.ndarray
+    out: np.ndarray
+    through: float
+    rest: np.ndarray
+
+
+def normal_form(sections: np.ndarray) -> NormalForm:
+    """Return a filter as pairs of poles, each fed by those before it.
+
+    Parameters
+    ----------
+    sections : (s, 6), each with a pair of complex poles, as the low-passes of even order have.
+
+    Raises
+    ------
+    ValueError
+        If a section has real poles.
+    """
+    n = 2 * len(sections)
+    across, into, out, rest = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n)
+    through = gain = 1.0  # of a sample, of a constant
+    for i, (b0, b1, b2, _, a1, a2) in enumerate(sections.tolist()):
+        # From the pole to one, which for low cut-offs is little, and is found without loss.
+        constant, half = math.fsum((1.0, a1, a2)), 1.0 + a1 / 2.0
+        if constant <= half * half:
+            raise ValueError("a section of a filter has real poles")
+        short = complex(half, -math.sqrt(constant - half * half))
+        pole = 1.0 - short
+        residue = ((b0 * pole + b1) * pole + b2) / (2j * pole.imag)
+        pair, enters = slice(2 * i, 2 * i + 2), np.array([residue.real, residue.imag])
+        across[pair] += np.outer(enters, out)
+        across[pair, pair] += [[pole.real, -pole.imag], [pole.imag, pole.real]]
+        into[pair] = enters * through
+        still = residue * gain / short
+        rest[pair] = still.real, still.imag
+        out *= b0
+        out[2 * i] = 2.0
+        through *= b0
+        gain *= (b0 + b1 + b2) / constant
+    return NormalForm(across=across, into=into, out=out, through=through, rest=rest)
 
 
 def slowest_pole(sections: np.ndarray) -> float:

@@ -1,6 +1,6 @@
 """Filters forward and backward: without delay, a group of columns at a time.
 
-Compiled from C where that can be had, and by SciPy elsewhere, operation by operation the same.
+Compiled from C where that can be had, SciPy's operations one by one; elsewhere in blocks.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ import numpy as np
 
 from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
+from dynident.recording.low_pass.block_filter import filtered_rows
 from dynident.recording.low_pass.sections import state_at_rest
 
 _LANES, _MOST_LANES = 4, 8
 """Columns that are filtered together; eight where the processor has vectors as wide: others are
 slower than with four."""
-_AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
+_AT_ONCE = 2**19  # numbers that are filtered at a time without a compiler; bounds the memory
 _LONG = np.dtype(ctypes.c_long)
 _SIZE, _PLACE = ctypes.c_long, ctypes.c_void_p
 _ARGUMENTS = (*(_SIZE,) * 3, *(_PLACE,) * 5, _SIZE, *(_PLACE,) * 3)
@@ -158,15 +159,18 @@ def zero_phase_columns(
         raise RecordingError(
             f"{samples} samples are too few to filter", where, f"at least {padding + 1} are needed"
         )
+    wanted = np.arange(samples) if rows is None else rows
     function = c_function(_source(len(sections)), _ENTRY)
     if function is not None:
-        wanted = np.arange(samples) if rows is None else rows
         _compiled(function, parts, sections, padding, wanted)
         return
-    for part in parts:
-        for some in np.array_split(part.chosen, max(1, len(part.chosen) // _AT_ONCE)):
-            y = _by_scipy(part.x[:, some], sections, padding)
-            part.out[:, some] = y if rows is None else y[rows]
+    columns = [(one.x[:, c], one.out[:, c]) for one in parts for c in one.chosen.tolist()]
+    count = max(1, _AT_ONCE // samples)
+    for start in range(0, len(columns), count):
+        some = columns[start : start + count]
+        found = filtered_rows([x for x, _ in some], sections, padding, wanted)
+        for (_, out), y in zip(some, found, strict=True):
+            out[:] = y
 
 
 @cache
@@ -235,23 +239,6 @@ def _places(
         first += [start + across * column for column in columns]
         steps += [down // one.itemsize] * len(columns)
     return np.array(first, dtype=np.uintp), np.array(steps, dtype=_LONG)
-
-
-def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
-    from scipy.signal import sosfilt  # takes long to load
-
-    # As sosfiltfilt, to the last bit, but for one or two columns in half the time: the filter's
-    # state at rest is kept, and each column lies in one piece.
-    columns = x.T
-    sections = sections.copy()  # SciPy takes none that is read-only
-    y = np.empty((len(columns), len(x) + 2 * padding))
-    y[:, padding : padding + len(x)] = columns
-    y[:, :padding] = 2 * columns[:, :1] - columns[:, padding:0:-1]
-    y[:, padding + len(x) :] = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
-    state = _state_at_rest(sections.tobytes(), len(sections))[:, None, :]
-    for _ in range(2):
-        y = sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
-    return y[:, padding : padding + len(x)].T
 
 
 @lru_cache(32)
