@@ -29,7 +29,7 @@ _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 """Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` takes one by one
 _HELD = 4  # motions whose columns of a block are held at a time, as decimated rows
-_MEMORY = (1 + _HELD) * 9 * 2**19
+_MEMORY = 12 * 2**20
 """Bytes that these are meant to take, with those of one motion before they are decimated."""
 _LEAST_BLOCK = 1792  # samples; of many fewer each has a larger part of what a block costs
 _FINEST = 1e-7
