@@ -17,10 +17,14 @@ STUDIES = {"two joints": "hidden_effect", "seven joints": "seven_joint_arm"}
 IMPORTS = "import pinocchio, scipy.signal, pandas, pydrake.multibody.plant"
 
 
-def measured(command: list[str], cache: str) -> dict[str, float]:
+WAYS = {"dynident": "auto", "dynident without a compiler": "never"}
+"""And what the environment says of compiling."""
+
+
+def measured(command: list[str], cache: str, compiling: str = "auto") -> dict[str, float]:
     """CPU time, wall clock and peak memory of a command."""
     start = time.perf_counter()
-    environment = {**os.environ, "XDG_CACHE_HOME": cache}
+    environment = {**os.environ, "XDG_CACHE_HOME": cache, "DYNIDENT_COMPILE": compiling}
     process = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
     )
@@ -48,7 +52,9 @@ def lines(size: Size) -> Iterator[Line]:
     with tempfile.TemporaryDirectory() as cache:
         measured([*own, "--help"], cache)  # files are in the system's memory
         for case, command in asked.items():
-            yield Line(case=case, who="dynident", figures=measured([*own, *command], cache))
+            for who, compiling in WAYS.items() if case != "--help" else [("dynident", "auto")]:
+                figures = measured([*own, *command], cache, compiling)
+                yield Line(case=case, who=who, figures=figures)
         figures = measured([sys.executable, "-c", IMPORTS], cache)
         yield Line(case="imports of a script by hand", who=f"`{IMPORTS}`", figures=figures)
 

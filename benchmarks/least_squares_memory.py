@@ -7,6 +7,7 @@ process above what it held with the recording in memory: arrays, libraries and a
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -24,6 +25,8 @@ from dynident.threads import single_threaded
 from side_by_side.line import Benchmark, Line, Size
 from side_by_side.measuring import added_mib
 
+WAYS = {"dynident.fit": "auto", "dynident.fit without a compiler": "never"}
+"""And what the environment says of compiling."""
 FILTERS = {"every row": FULL_RATE, "default filter": None}
 DENSE = "regressor stacked, NumPy lstsq"
 LIMIT = 300.0  # s of one size
@@ -65,11 +68,14 @@ def measured(samples: int, who: str, rows: str) -> dict[str, float]:
     }
 
 
-def alone(line: Line, said: list[str]) -> Line:
+def alone(line: Line, said: list[str], compiling: str) -> Line:
     """Fill in a line by a process of its own, with what `measured` takes."""
     command = [sys.executable, __file__, *said]
+    environment = {**os.environ, "DYNIDENT_COMPILE": compiling}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=LIMIT)
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True, timeout=LIMIT
+        )
     except subprocess.TimeoutExpired:
         return replace(line, missing=f"stopped after {LIMIT:g} s")
     except subprocess.CalledProcessError as error:
@@ -83,10 +89,11 @@ def lines(size: Size) -> Iterator[Line]:
     for rows in FILTERS:
         for samples in SIZES[size]:
             peers = [DENSE] if rows == "every row" and samples <= LONGEST_DENSE else []
-            for who in ("dynident.fit", *peers):
+            for who in (*WAYS, *peers):
                 case = f"{samples} samples, {rows}"
                 name = f"{who}, {rows}" if who != DENSE else who
-                yield alone(Line(case=case, who=name, at=samples), [str(samples), who, rows])
+                line = Line(case=case, who=name, at=samples)
+                yield alone(line, [str(samples), who, rows], WAYS.get(who, "auto"))
 
 
 BENCHMARK = Benchmark(
