@@ -157,9 +157,10 @@ def _replayed(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     d[:, :2] = _starts(links)
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
+        recursion = _Recursion(links, _AT_ONCE)
         for first in range(1, d.shape[1] - 1, _AT_ONCE):
             some = slice(first, min(first + _AT_ONCE, d.shape[1] - 1))
-            found = _walk_together(_Recursion.of(links, some), d[:, first - 1 : first + 1].T)
+            found = _walk_together(recursion.during(some), d[:, first - 1 : first + 1].T)
             d[:, some.start + 1 : some.stop + 1] = found.T
     own = zip(links, d, strict=True)
     return [DeadZoneMotion(moved[: len(one.a)], one.gear.half_gap) for one, moved in own]
@@ -175,7 +176,7 @@ def _starts(links: Sequence[DeadZoneLink]) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Recursion:
+class _Factors:
     """What the recursion of V links multiplies by in each of S steps.
 
     Attributes
@@ -192,28 +193,54 @@ class _Recursion:
     touching: np.ndarray
     half: np.ndarray
 
-    @classmethod
-    def of(cls, links: Sequence[DeadZoneLink], some: slice) -> _Recursion:
-        """Return it of some steps of all links; shorter ones repeat their last step."""
-        steps = some.stop - some.start
-        m, load, c, g = np.empty((4, steps, len(links)))
-        for v, link in enumerate(links):
-            for whole, own in ((m, link.m), (load, link.load), (c, link.c), (g, link.g)):
-                known = own[some]
-                whole[: len(known), v], whole[len(known) :, v] = known, own[-1]
-        h = np.array([link.step for link in links])
+
+class _Recursion:
+    """The factors of links, some steps after others in the same memory.
+
+    Parameters
+    ----------
+    links : shorter ones repeat their last step.
+    most : steps at a time.
+    """
+
+    def __init__(self, links: Sequence[DeadZoneLink], most: int) -> None:
+        self._signals = list(zip(*((one.m, one.load, one.c, one.g) for one in links), strict=True))
+        self._step = np.array([link.step for link in links])
         gears = [link.gear for link in links]
-        K, D, half = np.array([(one.stiffness, one.damping, one.half_gap) for one in gears]).T
-        mass, damping = m / h**2, c / (2.0 * h)
-        drive, free, touching = np.empty((3, steps, 2, len(links)))
-        drive[:, 0], drive[:, 1] = 2.0 * mass - g, K
-        for factors, damped in ((free, damping), (touching, damping + D / (2.0 * h))):
-            factors[:, 0] = 1.0 / (mass + damped)
-            factors[:, 1] = (mass - damped) * factors[:, 0]
-        return cls(load, drive, free, touching, half)
+        each = np.array([(one.stiffness, one.damping, one.half_gap) for one in gears])
+        self._K, self._D, self._half = each.T
+        self._read = np.empty((len(self._signals), most, len(links)))
+        self._made = np.empty((3, most, 2, len(links)))
+
+    def during(self, some: slice) -> _Factors:
+        """Return those of some steps, until others are asked for."""
+        steps, h = some.stop - some.start, self._step
+        m, load, c, g = self._read[:, :steps]
+        for whole, every in zip((m, load, c, g), self._signals, strict=True):
+            np.stack([_during(some, own) for own in every], axis=1, out=whole)
+        drive, free, touching = self._made[:, :steps]
+        m /= h**2
+        c /= 2.0 * h
+        np.multiply(2.0, m, out=drive[:, 0])
+        drive[:, 0] -= g
+        drive[:, 1] = self._K
+        for factors, more in ((free, 0.0), (touching, self._D / (2.0 * h))):
+            c += more
+            np.add(m, c, out=factors[:, 0])
+            np.divide(1.0, factors[:, 0], out=factors[:, 0])
+            np.subtract(m, c, out=factors[:, 1])
+            factors[:, 1] *= factors[:, 0]
+        return _Factors(load, drive, free, touching, self._half)
 
 
-def _walk_together(r: _Recursion, first: np.ndarray) -> np.ndarray:
+def _during(some: slice, own: np.ndarray) -> np.ndarray:
+    """Steps of a signal, of which the last goes on."""
+    known = own[some]
+    beyond = some.stop - some.start - len(known)
+    return np.append(known, np.full(beyond, own[-1])) if beyond else known
+
+
+def _walk_together(r: _Factors, first: np.ndarray) -> np.ndarray:
     """Return the next deflections (S, V) of V links after two known ones, (2, V).
 
     The call is what costs in a step, not its dozens of numbers: as few as can be.
@@ -244,7 +271,8 @@ def _walk_together(r: _Recursion, first: np.ndarray) -> np.ndarray:
 
 def _walk(link: DeadZoneLink) -> DeadZoneMotion:
     """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
-    r = _Recursion.of([link], slice(1, len(link.a) - 1))
+    inner = slice(1, len(link.a) - 1)
+    r = _Recursion([link], len(link.a)).during(inner)
     load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), link.gear.stiffness
     free, free_back = r.free[:, :, 0].T.tolist()
     touching, touching_back = r.touching[:, :, 0].T.tolist()
