@@ -22,7 +22,7 @@ from dynident.recording.low_pass.sections import state_at_rest
 _LANES, _MOST_LANES = 4, 8
 """Columns that are filtered together; eight where the processor has vectors as wide: others are
 slower than with four."""
-_AT_ONCE = 2**19  # numbers that are filtered at a time without a compiler; bounds the memory
+_AT_ONCE = 2**18  # numbers that are filtered at a time without a compiler; bounds the memory
 _LONG = np.dtype(ctypes.c_long)
 _SIZE, _PLACE = ctypes.c_long, ctypes.c_void_p
 _ARGUMENTS = (*(_SIZE,) * 3, *(_PLACE,) * 5, _SIZE, *(_PLACE,) * 3)
