@@ -17,7 +17,7 @@ STUDIES = {"two joints": "hidden_effect", "seven joints": "seven_joint_arm"}
 IMPORTS = "import pinocchio, scipy.signal, pandas, pydrake.multibody.plant"
 
 
-WAYS = {"dynident": "auto", "dynident without a compiler": "never"}
+WAYS = {"dynident": "auto", "dynident, no compiler": "never"}
 """And what the environment says of compiling."""
 
 

@@ -25,7 +25,7 @@ from dynident.threads import single_threaded
 from side_by_side.line import Benchmark, Line, Size
 from side_by_side.measuring import added_mib
 
-WAYS = {"dynident.fit": "auto", "dynident.fit without a compiler": "never"}
+WAYS = {"dynident.fit": "auto", "dynident.fit, no compiler": "never"}
 """And what the environment says of compiling."""
 FILTERS = {"every row": FULL_RATE, "default filter": None}
 DENSE = "regressor stacked, NumPy lstsq"
