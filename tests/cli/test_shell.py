@@ -60,7 +60,7 @@ def test_help_loads_nothing_that_computes_and_has_an_example():
 
 @pytest.mark.slow
 def test_a_fit_loads_only_what_it_uses(tmp_path):
-    """Of what is heavy: SciPy for the filters, Drake and Pinocchio for the robot.
+    """Of what is heavy: SciPy for linear algebra, Drake and Pinocchio for the robot.
 
     CasADi makes functions of many samples: here are few.
     """

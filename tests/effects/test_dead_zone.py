@@ -30,6 +30,11 @@ def links_of_several_lengths() -> list[DeadZoneLink]:
     return links
 
 
+def first_steps(link: DeadZoneLink, steps: int) -> DeadZoneLink:
+    signals = ("whole", "needed", "a", "c", "g")
+    return replace(link, **{name: getattr(link, name)[:steps] for name in signals})
+
+
 def equation_of_motion(link: DeadZoneLink, d: np.ndarray) -> np.ndarray:
     """What a deflection (S,) leaves of m d'' + c d' + g d + transmitted = load, by differences."""
     now, gear = d[1:-1], link.gear
@@ -60,6 +65,8 @@ def test_compiled_is_the_replay_to_the_bit(monkeypatch) -> None:
     links += [
         replace(links[0], needed=scale * links[0].needed) for scale in np.linspace(0.5, 2.0, 9)
     ]
+    # Some end long before the others, and about where a part of the steps does.
+    links += [first_steps(links[1], steps) for steps in (2, 3, 512, 513, 514, 700, 1025)]
     compiled = through_dead_zones(links)
     monkeypatch.setenv("DYNIDENT_COMPILE", "never")
     for one, replayed in zip(compiled, through_dead_zones(links), strict=True):

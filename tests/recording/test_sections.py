@@ -15,6 +15,9 @@ from dynident.recording.low_pass.sections import (
 )
 
 CHEBYSHEV = np.asarray(signal.cheby1(8, 0.05, 0.2, output="sos"))
+SPREAD = CHEBYSHEV.copy()
+"""The same filter with its gain in all sections, where it is in the first."""
+SPREAD[:, :3] *= [[0.125], [2.0], [2.0], [2.0]]
 
 
 @pytest.mark.parametrize("order", [2, 4, 8])
@@ -45,7 +48,7 @@ def test_a_filter_that_was_at_rest_stays_there() -> None:
 
 @pytest.mark.parametrize(
     "sections",
-    [*(butterworth_sections(share, 4) for share in (1e-3, 0.1, 0.5, 0.97)), CHEBYSHEV],
+    [*(butterworth_sections(share, 4) for share in (1e-3, 0.1, 0.5, 0.97)), CHEBYSHEV, SPREAD],
 )
 def test_the_normal_form_is_the_same_filter(sections: np.ndarray) -> None:
     form = normal_form(sections)

@@ -54,7 +54,7 @@ class Transmitting:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadZoneLink:
-    """A link behind a transmission with a dead zone, in steps of time.
+    """A link behind a transmission with a dead zone, in steps of time: S, two at least.
 
     Attributes
     ----------
@@ -273,10 +273,10 @@ def _walk(link: DeadZoneLink) -> DeadZoneMotion:
     """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
     inner = slice(1, len(link.a) - 1)
     r = _Recursion([link], len(link.a)).during(inner)
-    load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), link.gear.stiffness
+    load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), float(link.gear.stiffness)
     free, free_back = r.free[:, :, 0].T.tolist()
     touching, touching_back = r.touching[:, :, 0].T.tolist()
-    half = link.gear.half_gap
+    half = float(link.gear.half_gap)
     before, now = _starts([link])[0].tolist()
     d = [before, now]
     for k in range(len(load)):

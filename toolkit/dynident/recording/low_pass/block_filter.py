@@ -2,9 +2,12 @@
 
 A filter with states s is s' = A s + b x, y = c s + d x. Over a block of samples its states move by
 a power of A and a sum of the block's samples, and those that the backward pass meets, as well as
-the samples that are wanted, are such sums too (Burrus 1972, Block realization of digital filters).
-So each block is a row of one matrix product, and only states are led from block to block. Samples
-between those that are wanted are never written out.
+the samples that are wanted, are such sums too. So each block is a row of one matrix product, and
+only states are led from block to block. Samples between those that are wanted are never written
+out.
+
+Source: C. W. Barnes and S. Shinnaka, "Block-shift invariance and block implementation of
+discrete-time filters", IEEE Transactions on Circuits and Systems 27 (1980), for one pass.
 """
 
 from __future__ import annotations
@@ -54,9 +57,13 @@ def filtered_rows(
     end, backward = _last_block(last, states[:, -1:], f)
     found[:, :, n:] += states[:, :-1] @ f.of_states
     met = _led(backward, found[:, ::-1, n : 2 * n], f)[:, ::-1]
-    wanted = found[:, :, 2 * n :] + met[:, 1:] @ f.of_later_states
-    wanted = wanted.reshape(len(w), count * wanted.shape[2])
-    every = np.concatenate([wanted, end[:, ::apart]], axis=1)
+    wanted = f.of_later_states.shape[1]  # of a block
+    every = np.empty((len(w), count * wanted + len(range(0, end.shape[1], apart))))
+    inner = every[:, : count * wanted].reshape(len(w), count, wanted)
+    np.matmul(met[:, 1:], f.of_later_states, out=inner)
+    inner += found[:, :, 2 * n :]
+    every[:, count * wanted :] = end[:, ::apart]
+    del w, whole, last, found  # long records are as large as this, each of them
     return every[:, (ahead + padding + rows) // apart]
 
 

@@ -77,8 +77,8 @@ def state_at_rest(sections: np.ndarray) -> np.ndarray:
 class NormalForm:
     """A filter with n states s: s' = across s + into x, y = out s + through x.
 
-    Each pair of states turns and fades as a pair of poles, so that they are no larger than what
-    comes of them; those of direct forms are, for low cut-offs, and lose digits.
+    Each pair of states turns and fades as a pair of poles, and so do its roundings; those of direct
+    forms are summed up twice for low cut-offs, which lose digits.
 
     Attributes
     ----------
@@ -111,8 +111,8 @@ def normal_form(sections: np.ndarray) -> NormalForm:
     across, into, out, rest = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n)
     through = gain = 1.0  # of a sample, of a constant
     for i, (b0, b1, b2, _, a1, a2) in enumerate(sections.tolist()):
-        # From the pole to one, which for low cut-offs is little, and is found without loss.
-        constant, half = math.fsum((1.0, a1, a2)), 1.0 + a1 / 2.0
+        # From the pole to one, which for low cut-offs is little: in this order nothing is lost.
+        constant, half = 1.0 + a1 + a2, 1.0 + a1 / 2.0
         if constant <= half * half:
             raise ValueError("a section of a filter has real poles")
         short = complex(half, -math.sqrt(constant - half * half))

@@ -140,10 +140,10 @@ def zero_phase_columns(
     Parameters
     ----------
     parts : of as many samples.
-    sections : of the filter, (s, 6) as `butterworth_sections` gives them.
+    sections : of the filter, (s, 6) as `butterworth_sections` gives them, with complex poles.
     padding : samples of point reflection at each end.
     where : file, for messages.
-    rows : (R,) the rows that are wanted; None for all.
+    rows : (R,) the rows that are wanted, one at least; None for all.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def zero_phase_columns(
         raise RecordingError(
             f"{samples} samples are too few to filter", where, f"at least {padding + 1} are needed"
         )
-    wanted = np.arange(samples) if rows is None else rows
+    wanted = np.arange(samples) if rows is None else np.asarray(rows, dtype=int)
     function = c_function(_source(len(sections)), _ENTRY)
     if function is not None:
         _compiled(function, parts, sections, padding, wanted)
@@ -168,7 +168,8 @@ def zero_phase_columns(
     count = max(1, _AT_ONCE // samples)
     for start in range(0, len(columns), count):
         some = columns[start : start + count]
-        found = filtered_rows([x for x, _ in some], sections, padding, wanted)
+        with np.errstate(over="ignore", invalid="ignore"):  # not finite where the column is not
+            found = filtered_rows([x for x, _ in some], sections, padding, wanted)
         for (_, out), y in zip(some, found, strict=True):
             out[:] = y
 
