@@ -23,7 +23,7 @@ from dynident.evidence.runs import Run
 from dynident.formulas import Formula, Signal, evaluate, parse_formula
 from dynident.moments.second_moments import SecondMoments
 
-_AT_ONCE = 48  # terms; the products of two of them are not needed, and grow with the square
+_AT_ONCE = 48  # terms
 _MOST_FACTORS = 3
 
 
@@ -160,25 +160,28 @@ def _drops(
     terms: _SomeProducts,
 ) -> np.ndarray:
     """What each of some terms takes off, (m,)."""
-    with_model, with_self = [], []
+    starts = np.cumsum(terms.sizes) - terms.sizes
+    sizes = sorted(set(terms.sizes.tolist()))
+    alike = [np.flatnonzero(terms.sizes == size) for size in sizes]
+    places = [starts[which][:, None] + np.arange(k) for which, k in zip(alike, sizes, strict=True)]
+    with_model: list[SecondMoments] = []
+    with_own: list[list[SecondMoments]] = [[] for _ in alike]
     for stack, known in zip(evidence.stacks, fitted.white, strict=True):
         signals = [[[terms.columns(one)] for one in rows[r]] for r in stack.numbers]
         white = stack.whitened(signals, joint, fitted.noise[joint])
         with_model.append(known[joint].moments_with(white))
-        with_self.append(stack.moments(white, white))
+        for own, at in zip(with_own, places, strict=True):
+            of_each = white[:, at]  # products of two terms are not needed
+            own.append(stack.moments(of_each, of_each))
     beside = SecondMoments.stacked(with_model).pooled().signal
-    own = SecondMoments.stacked(with_self).pooled().signal
     p = len(fitted.values)
     back = fitted.solution.project(beside[:p])
-    left = own - beside[:p].T @ back
     moment = beside[p] - back.T @ fitted.pooled.signal[:p, p]
-    found, starts = np.zeros(len(terms.sizes)), np.cumsum(terms.sizes) - terms.sizes
-    for size in set(terms.sizes.tolist()):
-        which = np.flatnonzero(terms.sizes == size)
-        at = starts[which][:, None] + np.arange(size)
-        each = at[:, :, None], at[:, None, :]
-        least = evidence.criteria.proposals.least_left
-        found[which] = _taken_off(own[each], left[each], moment[at], least)
+    found, least = np.zeros(len(terms.sizes)), evidence.criteria.proposals.least_left
+    for which, at, some in zip(alike, places, with_own, strict=True):
+        own = SecondMoments.stacked(some).pooled().signal
+        left = own - np.einsum("pmi,pmj->mij", beside[:p, at], back[:, at])
+        found[which] = _taken_off(own, left, moment[at], least)
     return found
 
 
