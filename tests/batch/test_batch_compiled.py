@@ -1,9 +1,11 @@
 """Compiled functions: the same numbers to the bit, or a reason and the replay."""
 
+import ctypes
 import os
 import stat
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 from random_trees import random_tree, urdf
 
 from chains import chain
-from dynident.batch import compiler, evaluations, kernel, wish
+from dynident.batch import c_function, compiler, evaluations, kernel, wish
 from dynident.batch.c_source import ENTRY, c_source
 from dynident.batch.kernel import Kernel
 from dynident.batch.newton_euler import regressor_equations, torque_equations
@@ -145,6 +147,18 @@ def test_what_cannot_be_compiled_is_replayed_with_a_reason(fault, tmp_path, monk
         assert reasons[fault] in found.evaluation.reason
     left = tmp_path / "cache" / "dynident" / "batch"
     assert not left.exists() or not list(left.glob("*.tmp"))
+
+
+@needs_compiler
+def test_a_recursion_is_compiled_where_nothing_can_be_kept(tmp_path, monkeypatch):
+    """Its results do not depend on where its user may write; and nothing stays behind."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/x")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    found = c_function("double of_the_moment(void) { return 2.0; }", "of_the_moment")
+    assert found is not None
+    found.restype = ctypes.c_double
+    assert found() == 2.0 and not list(tmp_path.iterdir())
+    assert c_function("no C", "of_the_moment") is None
 
 
 @needs_compiler

@@ -42,6 +42,10 @@ class NotCompiled(Exception):
     """There is no compiled function; the message says why."""
 
 
+class NotKept(NotCompiled):
+    """There is none since the cache cannot be used."""
+
+
 @cache
 def compiler() -> str | None:
     """Path of the C compiler that is used; None if there is none."""
@@ -85,8 +89,9 @@ def compiled(source: str, entry: str, level: Level = "-O1") -> Any:
     Raises
     ------
     NotCompiled
-        If there is no compiler, it fails, or the cache cannot be written or read, or another user
-        may write it.
+        If there is no compiler, or it fails.
+    NotKept
+        If the cache cannot be written or read, or another user may write it.
     """
     try:
         place = _place(source, level)
@@ -99,6 +104,27 @@ def compiled(source: str, entry: str, level: Level = "-O1") -> Any:
         raise NotCompiled(f"the compiler took more than {_PATIENCE:.0f} s") from None
     # RuntimeError: no home folder; AttributeError: a library of another making.
     except (OSError, RuntimeError, AttributeError, ValueError) as error:
+        raise NotKept(f"{type(error).__name__}: {error}") from None
+
+
+def compiled_unkept(source: str, entry: str, level: Level = "-O1") -> Any:
+    """Return a function of a C source as `compiled`, for this process alone.
+
+    Parameters
+    ----------
+    source, entry, level : as for `compiled`.
+
+    Raises
+    ------
+    NotCompiled
+        If there is no compiler, it fails, or there is no place for files of the moment.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix="dynident-") as folder:
+            place = Path(folder) / "function.so"
+            _compile(source, place, level)
+            return getattr(ctypes.CDLL(str(place)), entry)
+    except (OSError, AttributeError, subprocess.TimeoutExpired) as error:
         raise NotCompiled(f"{type(error).__name__}: {error}") from None
 
 
@@ -109,16 +135,16 @@ def _loaded(place: Path, entry: str) -> Any:
 
 
 def _refuse_what_others_write(path: Path) -> None:
-    """Raise `NotCompiled` if a file or folder is not this user's alone to write.
+    """Raise `NotKept` if a file or folder is not this user's alone to write.
 
     To load a library is to run it.
     """
     try:
         reason = others_may_write(path)
     except FileError as error:
-        raise NotCompiled(str(error)) from None
+        raise NotKept(str(error)) from None
     if reason:
-        raise NotCompiled(f"{path} {reason}")
+        raise NotKept(f"{path} {reason}")
 
 
 def _compile(source: str, place: Path, level: Level) -> None:

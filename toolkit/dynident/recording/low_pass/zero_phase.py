@@ -1,6 +1,7 @@
 """Filters forward and backward: without delay, a group of columns at a time.
 
-Compiled from C where that can be had, SciPy's operations one by one; elsewhere in blocks.
+Compiled from C where that can be had, SciPy's operations one by one; elsewhere in blocks, which is
+the same up to rounding.
 """
 
 from __future__ import annotations
